@@ -1,0 +1,13 @@
+//! The mathematics of multi-arm manipulation of articulated objects (V-MAO, Liu & Kitani, CoRL 2021).
+//!
+//! Geometry, the object graph, object-centric control, operational space control, kinematics, planning,
+//! contacts, grasp orders and outcomes. This crate knows nothing of the simulator, of tensors, of files,
+//! of the clock or of threads.
+
+pub mod contact;
+pub mod geometry;
+pub mod observation;
+pub mod outcome;
+pub mod random;
+pub mod rollout;
+pub mod shape;

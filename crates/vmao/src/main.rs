@@ -1,0 +1,2 @@
+//! The vmao program.
+fn main() {}
