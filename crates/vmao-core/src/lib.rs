@@ -6,8 +6,11 @@
 
 pub mod contact;
 pub mod geometry;
+pub mod object;
 pub mod observation;
+pub mod order;
 pub mod outcome;
 pub mod random;
+pub mod record;
 pub mod rollout;
 pub mod shape;
