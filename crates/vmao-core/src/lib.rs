@@ -7,6 +7,8 @@
 pub mod contact;
 pub mod geometry;
 pub mod object;
+pub mod object_centric;
+pub mod object_graph;
 pub mod observation;
 pub mod order;
 pub mod outcome;
