@@ -5,7 +5,10 @@
 //! of the clock or of threads.
 
 pub mod contact;
+pub mod distance;
 pub mod geometry;
+pub mod inverse_kinematics;
+pub mod kinematics;
 pub mod object;
 pub mod observation;
 pub mod order;
