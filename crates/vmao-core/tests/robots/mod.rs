@@ -1,7 +1,7 @@
 //! Kinematic tables of the two robots, for tests only (joint frames and limits of the published models).
 #![allow(dead_code, reason = "each test file uses some of them")]
 
-use std::f64::consts::FRAC_PI_4;
+use std::f64::consts::{FRAC_PI_2, FRAC_PI_4};
 use vmao_core::{
     geometry::{pose, translation},
     kinematics::{ChainJoint, SerialChain},
@@ -49,6 +49,6 @@ pub(crate) fn sawyer() -> SerialChain {
 }
 
 /// Menagerie's home pose of the Panda.
-pub(crate) const PANDA_HOME: [f64; 7] = [0.0, 0.0, 0.0, -1.57079, 0.0, 1.57079, -0.7853];
+pub(crate) const PANDA_HOME: [f64; 7] = [0.0, 0.0, 0.0, -FRAC_PI_2, 0.0, FRAC_PI_2, -FRAC_PI_4];
 /// Sawyer's neutral pose.
 pub(crate) const SAWYER_NEUTRAL: [f64; 7] = [0.0, -1.18, 0.0, 2.18, 0.0, 0.57, 3.3161];
