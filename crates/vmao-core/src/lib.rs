@@ -4,15 +4,21 @@
 //! contacts, grasp orders and outcomes. This crate knows nothing of the simulator, of tensors, of files,
 //! of the clock or of threads.
 
+pub mod collision;
 pub mod contact;
+pub mod distance;
 pub mod geometry;
+pub mod inverse_kinematics;
+pub mod kinematics;
 pub mod object;
 pub mod object_centric;
 pub mod object_graph;
 pub mod observation;
 pub mod order;
 pub mod outcome;
+pub mod planning;
 pub mod random;
 pub mod record;
 pub mod rollout;
 pub mod shape;
+pub mod time_parameterization;

@@ -1,0 +1,365 @@
+//! Motion planning for all arms together: straight line, one arm at a time, then RRT-Connect, then shortcuts.
+//!
+//! RRT-Connect is Kuffner & LaValle, ICRA 2000, in the joint space of all arms at once. Edges are checked at
+//! `PlanSettings::step`; a finished path is checked again five times finer, and planned anew at a finer step if it fails.
+
+use crate::{
+    collision::{CollisionChecker, CollisionPair, CollisionWorld},
+    random::Stream,
+    time_parameterization::{MotionLimits, Trajectory},
+};
+
+/// How hard to look for a path and how closely to check it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct PlanSettings {
+    /// Most any joint turns between two collision checks while planning (rad); the result is checked five times finer.
+    pub step: f64,
+    /// Longest new branch of a tree, by its most moved joint (rad).
+    pub extension: f64,
+    /// Most random samples.
+    pub max_iterations: usize,
+    /// Attempts to shorten the path.
+    pub shortcut_iterations: usize,
+    /// Least distance between things that must not touch (m).
+    pub margin: f64,
+    /// Arms that stay at their start; they still are in the way.
+    pub frozen_arms: Vec<usize>,
+}
+
+impl Default for PlanSettings {
+    fn default() -> Self {
+        let (step, extension, margin) = (0.05, 0.6, 0.005);
+        Self { step, extension, max_iterations: 20_000, shortcut_iterations: 150, margin, frozen_arms: Vec::new() }
+    }
+}
+
+/// A path, or why there is none.
+#[derive(Debug, Clone, PartialEq)]
+pub enum PlanOutcome {
+    /// Waypoints from start to goal, joined by straight lines in joint space; each holds all arms' angles (rad).
+    Path(Vec<Vec<f64>>),
+    /// No path.
+    Failed(PlanFailure),
+}
+
+/// Why there is no path.
+#[derive(Debug, Clone, PartialEq)]
+pub enum PlanFailure {
+    /// The start is closer than the margin to a collision.
+    StartInCollision(CollisionPair),
+    /// The goal is closer than the margin to a collision.
+    GoalInCollision(CollisionPair),
+    /// The start or the goal is outside the joint limits.
+    OutOfLimits,
+    /// No path was found in `max_iterations` samples; this does not say that there is none.
+    BudgetExhausted,
+}
+
+/// A collision-free path of all arms from `start` to `goal` (flat, arm after arm, rad).
+///
+/// A frozen arm stays at its start whatever the goal says. Panics if `start` or `goal` has not one angle per joint.
+pub fn plan(world: &CollisionWorld, start: &[f64], goal: &[f64], settings: &PlanSettings, stream: &mut Stream) -> PlanOutcome {
+    let mut planner = Planner::new(world, settings);
+    assert!(start.len() == planner.free.len() && goal.len() == start.len(), "one angle per joint of all arms");
+    let goal: Vec<f64> = (0..start.len()).map(|i| if planner.free[i] { goal[i] } else { start[i] }).collect();
+    if !world.within_limits(start) || !world.within_limits(&goal) {
+        return PlanOutcome::Failed(PlanFailure::OutOfLimits);
+    }
+    if let Some(pair) = planner.checker.check(start, settings.margin) {
+        return PlanOutcome::Failed(PlanFailure::StartInCollision(pair));
+    }
+    if let Some(pair) = planner.checker.check(&goal, settings.margin) {
+        return PlanOutcome::Failed(PlanFailure::GoalInCollision(pair));
+    }
+    let finest = settings.step / 5.0;
+    for step in [settings.step, settings.step / 2.0, finest] {
+        planner.step = step;
+        let Some(mut path) = planner.find(start, &goal, stream) else { break };
+        planner.shorten(&mut path, stream);
+        planner.step = finest;
+        if step == finest || planner.is_free(&path) {
+            return PlanOutcome::Path(path);
+        }
+    }
+    PlanOutcome::Failed(PlanFailure::BudgetExhausted)
+}
+
+/// Times a path, cutting its corners as widely as stays free of collision by `margin` (m), sampled every 5 ms.
+///
+/// Corners come within 0.2 rad of their waypoint down to 0.001 rad; with `None` even the least cut collides.
+pub fn time_path(world: &CollisionWorld, path: &[Vec<f64>], limits: &MotionLimits, margin: f64) -> Option<Trajectory> {
+    const SAMPLE_PERIOD: f64 = 0.005;
+    let mut checker = CollisionChecker::new(world);
+    [0.2, 0.05, 0.01, 0.001].into_iter().find_map(|deviation| {
+        let trajectory = Trajectory::new(path, limits, deviation);
+        let samples = (trajectory.duration() / SAMPLE_PERIOD).ceil() as usize;
+        let free = (0..=samples).all(|i| checker.is_free(&trajectory.at(i as f64 * SAMPLE_PERIOD).0, margin));
+        free.then_some(trajectory)
+    })
+}
+
+struct Planner<'a> {
+    world: &'a CollisionWorld,
+    settings: &'a PlanSettings,
+    checker: CollisionChecker<'a>,
+    step: f64,
+    samples_left: usize,
+    /// Whether each joint may move.
+    free: Vec<bool>,
+    /// The arm of each joint.
+    arm_of: Vec<usize>,
+    limits: Vec<[f64; 2]>,
+}
+
+impl<'a> Planner<'a> {
+    fn new(world: &'a CollisionWorld, settings: &'a PlanSettings) -> Self {
+        let arms = || world.arms.iter().enumerate().flat_map(|(arm, model)| model.chain.joints.iter().map(move |j| (arm, j)));
+        Self {
+            world,
+            settings,
+            checker: CollisionChecker::new(world),
+            step: settings.step,
+            samples_left: settings.max_iterations,
+            free: arms().map(|(arm, _)| !settings.frozen_arms.contains(&arm)).collect(),
+            arm_of: arms().map(|(arm, _)| arm).collect(),
+            limits: arms().map(|(_, joint)| [joint.lower, joint.upper]).collect(),
+        }
+    }
+
+    fn find(&mut self, start: &[f64], goal: &[f64], stream: &mut Stream) -> Option<Vec<Vec<f64>>> {
+        if self.edge_is_free(start, goal) {
+            return Some(vec![start.to_vec(), goal.to_vec()]);
+        }
+        self.one_arm_after_the_other(start, goal).or_else(|| self.grow_trees(start, goal, stream))
+    }
+
+    /// Tries to move whole arms in turn, in every order: cheap, and often all that crossed arms need.
+    fn one_arm_after_the_other(&mut self, start: &[f64], goal: &[f64]) -> Option<Vec<Vec<f64>>> {
+        const MOST_ARMS: usize = 4; // 24 orders
+        let moves = |&arm: &usize| (0..start.len()).any(|i| self.arm_of[i] == arm && start[i] != goal[i]);
+        let arms: Vec<usize> = (0..self.world.arms.len()).filter(moves).collect();
+        if arms.len() < 2 || arms.len() > MOST_ARMS {
+            return None;
+        }
+        orders(&arms).into_iter().find_map(|order| {
+            let mut path = vec![start.to_vec()];
+            for arm in order {
+                let from = path.last()?;
+                let to: Vec<f64> = (0..from.len()).map(|i| if self.arm_of[i] == arm { goal[i] } else { from[i] }).collect();
+                if !self.edge_is_free(from, &to) {
+                    return None;
+                }
+                path.push(to);
+            }
+            Some(path)
+        })
+    }
+
+    fn grow_trees(&mut self, start: &[f64], goal: &[f64], stream: &mut Stream) -> Option<Vec<Vec<f64>>> {
+        let mut trees = [Tree::new(start), Tree::new(goal)];
+        let mut side = 0;
+        while self.samples_left > 0 {
+            self.samples_left -= 1;
+            let limits = self.limits.iter().zip(&self.free).zip(start);
+            let sample: Vec<f64> =
+                limits.map(|((&[low, high], &free), &at)| if free { stream.range(low, high) } else { at }).collect();
+            if let Some(node) = self.extend(&mut trees[side], &sample) {
+                let target = trees[side].point(node).to_vec();
+                let mut reached = None;
+                while let Some(next) = self.extend(&mut trees[1 - side], &target) {
+                    if trees[1 - side].point(next) == target {
+                        reached = Some(next);
+                        break;
+                    }
+                }
+                if let Some(other) = reached {
+                    let (from_start, from_goal) = if side == 0 { (node, other) } else { (other, node) };
+                    let mut path = trees[0].path_to(from_start);
+                    path.reverse();
+                    path.extend(trees[1].path_to(from_goal).into_iter().skip(1));
+                    return Some(path);
+                }
+            }
+            // the smaller tree grows next, so that neither side stays a stub
+            side = usize::from(trees[1].parents.len() < trees[0].parents.len());
+        }
+        None
+    }
+
+    /// Grows `tree` from its nearest node towards `target` by at most one extension; the new node, if the way is free.
+    fn extend(&mut self, tree: &mut Tree, target: &[f64]) -> Option<usize> {
+        let nearest = tree.nearest(target);
+        let from = tree.point(nearest);
+        let turn = largest_turn(from, target);
+        if turn == 0.0 {
+            return None;
+        }
+        let fraction = self.settings.extension / turn;
+        let to = if fraction >= 1.0 { target.to_vec() } else { blend(from, target, fraction) };
+        self.edge_is_free(from, &to).then(|| tree.push(&to, nearest))
+    }
+
+    /// Whether the straight line is free at the present step, its start excepted; middles first, they fail soonest.
+    fn edge_is_free(&mut self, from: &[f64], to: &[f64]) -> bool {
+        let count = (largest_turn(from, to) / self.step).ceil().max(1.0) as u32;
+        let bits = u32::BITS - count.leading_zeros();
+        (0..1_u32 << bits).map(|i| i.reverse_bits() >> (u32::BITS - bits)).filter(|i| (1..=count).contains(i)).all(|i| {
+            let q = if i == count { to.to_vec() } else { blend(from, to, f64::from(i) / f64::from(count)) };
+            self.checker.is_free(&q, self.settings.margin)
+        })
+    }
+
+    fn is_free(&mut self, path: &[Vec<f64>]) -> bool {
+        path.windows(2).all(|edge| self.edge_is_free(&edge[0], &edge[1]))
+    }
+
+    /// Replaces random stretches by straight lines, of all arms or of one arm alone, where that is free and shorter.
+    fn shorten(&mut self, path: &mut Vec<Vec<f64>>, stream: &mut Stream) {
+        let arms = self.world.arms.len();
+        for _ in 0..self.settings.shortcut_iterations {
+            if path.len() <= 2 {
+                return;
+            }
+            let total = length(path);
+            let (a, b) = (stream.unit() * total, stream.unit() * total);
+            let choice = if arms > 1 { stream.index(arms + 1) } else { 0 };
+            let (first, from) = at_length(path, a.min(b));
+            let (last, to) = at_length(path, a.max(b));
+            if first == last {
+                continue;
+            }
+            let mut stretch = vec![from];
+            if choice < arms && arms > 1 {
+                stretch.extend_from_slice(&path[first + 1..=last]);
+                stretch.push(to);
+                self.straighten_arm(&mut stretch, choice);
+            } else {
+                stretch.push(to);
+            }
+            let mut candidate = path[..=first].to_vec();
+            candidate.extend(stretch.iter().cloned());
+            candidate.extend_from_slice(&path[last + 1..]);
+            if length(&candidate) < total - 1e-9 && self.is_free(&stretch) {
+                candidate.dedup();
+                *path = candidate;
+            }
+        }
+        remove_collinear(path);
+    }
+
+    /// Lets one arm go straight over a stretch while the others keep their way.
+    fn straighten_arm(&self, stretch: &mut [Vec<f64>], arm: usize) {
+        let total = length(stretch);
+        let (Some(from), Some(to)) = (stretch.first().cloned(), stretch.last().cloned()) else { return };
+        let mut done = 0.0;
+        let mut before = from.clone();
+        for point in stretch.iter_mut() {
+            done += distance(&before, point);
+            before.clone_from(point);
+            for i in (0..point.len()).filter(|&i| self.arm_of[i] == arm) {
+                point[i] = from[i] + (to[i] - from[i]) * (done / total).min(1.0);
+            }
+        }
+    }
+}
+
+/// Nodes of one search tree, root first.
+struct Tree {
+    width: usize,
+    points: Vec<f64>,
+    parents: Vec<usize>,
+}
+
+impl Tree {
+    fn new(root: &[f64]) -> Self {
+        Self { width: root.len(), points: root.to_vec(), parents: vec![0] }
+    }
+
+    fn point(&self, node: usize) -> &[f64] {
+        &self.points[node * self.width..(node + 1) * self.width]
+    }
+
+    fn push(&mut self, point: &[f64], parent: usize) -> usize {
+        self.points.extend_from_slice(point);
+        self.parents.push(parent);
+        self.parents.len() - 1
+    }
+
+    fn nearest(&self, target: &[f64]) -> usize {
+        let mut best = (f64::INFINITY, 0);
+        for (node, point) in self.points.chunks_exact(self.width).enumerate() {
+            let square = point.iter().zip(target).map(|(a, b)| (a - b) * (a - b)).sum();
+            if square < best.0 {
+                best = (square, node);
+            }
+        }
+        best.1
+    }
+
+    /// From `node` back to the root.
+    fn path_to(&self, node: usize) -> Vec<Vec<f64>> {
+        let mut path = vec![self.point(node).to_vec()];
+        let mut node = node;
+        while node != 0 {
+            node = self.parents[node];
+            path.push(self.point(node).to_vec());
+        }
+        path
+    }
+}
+
+fn orders(items: &[usize]) -> Vec<Vec<usize>> {
+    if items.is_empty() {
+        return vec![Vec::new()];
+    }
+    let led_by = |i: usize| {
+        let rest: Vec<usize> = items.iter().copied().filter(|&item| item != items[i]).collect();
+        orders(&rest).into_iter().map(move |mut order| {
+            order.insert(0, items[i]);
+            order
+        })
+    };
+    (0..items.len()).flat_map(led_by).collect()
+}
+
+fn blend(from: &[f64], to: &[f64], fraction: f64) -> Vec<f64> {
+    from.iter().zip(to).map(|(a, b)| a + (b - a) * fraction).collect()
+}
+
+fn largest_turn(a: &[f64], b: &[f64]) -> f64 {
+    a.iter().zip(b).map(|(x, y)| (x - y).abs()).fold(0.0, f64::max)
+}
+
+fn distance(a: &[f64], b: &[f64]) -> f64 {
+    a.iter().zip(b).map(|(x, y)| (x - y) * (x - y)).sum::<f64>().sqrt()
+}
+
+fn length(path: &[Vec<f64>]) -> f64 {
+    path.windows(2).map(|edge| distance(&edge[0], &edge[1])).sum()
+}
+
+/// The edge and the point that lie `along` the path (rad).
+fn at_length(path: &[Vec<f64>], along: f64) -> (usize, Vec<f64>) {
+    let mut left = along;
+    for (index, edge) in path.windows(2).enumerate() {
+        let edge_length = distance(&edge[0], &edge[1]);
+        if left < edge_length {
+            return (index, blend(&edge[0], &edge[1], left / edge_length));
+        }
+        left -= edge_length;
+    }
+    (path.len() - 2, path[path.len() - 1].clone())
+}
+
+/// Drops waypoints that lie on the line between their neighbours.
+fn remove_collinear(path: &mut Vec<Vec<f64>>) {
+    let mut i = 1;
+    while i + 1 < path.len() {
+        let (before, after) = (distance(&path[i - 1], &path[i]), distance(&path[i], &path[i + 1]));
+        if before + after - distance(&path[i - 1], &path[i + 1]) < 1e-12 * (before + after) {
+            path.remove(i);
+        } else {
+            i += 1;
+        }
+    }
+}

@@ -1,0 +1,171 @@
+//! Signed distances against closed forms and against an independent slow search.
+
+use nalgebra::{Point3, Vector3};
+use proptest::prelude::*;
+use vmao_core::{
+    distance::Convex,
+    geometry::{Pose, pose, translation},
+    random::Stream,
+    shape::Shape,
+};
+
+const BALL: Shape = Shape::Sphere { radius: 0.1 };
+const ROD: Shape = Shape::Capsule { radius: 0.1, half_length: 0.5 };
+const CUBE: Shape = Shape::Box { half_extents: [0.5, 0.5, 0.5] };
+
+fn distance(a: (Shape, Pose), b: (Shape, Pose)) -> f64 {
+    let (a, b) = (Convex::new(&a.0, &a.1), Convex::new(&b.0, &b.1));
+    let there = a.signed_distance(&b);
+    assert!((there - b.signed_distance(&a)).abs() < 1e-9, "the same both ways");
+    for margin in [-0.05, 0.0, 0.01, 0.3, there - 1e-6, there + 1e-6] {
+        assert_eq!(a.closer_than(&b, margin), there < margin, "margin {margin}, distance {there}");
+    }
+    there
+}
+
+fn at(x: f64, y: f64, z: f64) -> Pose {
+    translation(x, y, z)
+}
+
+#[test]
+fn closed_forms() {
+    let lying = pose([0.0, 0.0, 0.5], [1.0, 1.0, 0.0, 0.0]); // a rod along y
+    let edge_up = pose([2.0, 0.0, 0.0], [(std::f64::consts::FRAC_PI_8).cos(), 0.0, 0.0, (std::f64::consts::FRAC_PI_8).sin()]);
+    let root = std::f64::consts::SQRT_2;
+    let cases = [
+        ("balls", (BALL, at(0.0, 0.0, 0.0)), (BALL, at(0.0, 3.0, 4.0)), 4.8),
+        ("balls that touch", (BALL, at(0.0, 0.0, 0.0)), (BALL, at(0.2, 0.0, 0.0)), 0.0),
+        ("one ball in the other", (BALL, at(0.0, 0.0, 0.0)), (BALL, at(0.0, 0.0, 0.0)), -0.2),
+        ("parallel rods", (ROD, at(0.0, 0.0, 0.0)), (ROD, at(0.7, 0.0, 0.3)), 0.5),
+        ("parallel rods end to end", (ROD, at(0.0, 0.0, 0.0)), (ROD, at(0.0, 0.0, 2.0)), 0.8),
+        ("crossed rods", (ROD, at(0.3, 0.0, 0.5)), (ROD, lying), 0.1),
+        ("rods that cross", (ROD, at(0.0, 0.0, 0.5)), (ROD, lying), -0.2),
+        (
+            "a rod of no length",
+            (Shape::Capsule { radius: 0.1, half_length: 0.0 }, at(0.0, 0.0, 0.0)),
+            (ROD, at(0.0, 1.0, 0.0)),
+            0.8,
+        ),
+        ("cubes face to face", (CUBE, at(0.0, 0.0, 0.0)), (CUBE, at(1.5, 0.2, -0.3)), 0.5),
+        ("cubes edge to edge", (CUBE, at(0.0, 0.0, 0.0)), (CUBE, at(2.0, 2.0, 0.0)), root),
+        ("cubes corner to corner", (CUBE, at(0.0, 0.0, 0.0)), (CUBE, at(2.0, 2.0, 2.0)), 3.0_f64.sqrt()),
+        ("face to a turned cube's edge", (CUBE, at(0.0, 0.0, 0.0)), (CUBE, edge_up), 1.5 - root / 2.0),
+        ("cubes that touch", (CUBE, at(0.0, 0.0, 0.0)), (CUBE, at(1.0, 0.0, 0.0)), 0.0),
+        ("cubes that overlap", (CUBE, at(0.0, 0.0, 0.0)), (CUBE, at(0.7, 0.1, 0.2)), -0.3),
+        ("a cube in itself", (CUBE, at(0.0, 0.0, 0.0)), (CUBE, at(0.0, 0.0, 0.0)), -1.0),
+        ("ball over face", (BALL, at(0.2, 0.1, 0.9)), (CUBE, at(0.0, 0.0, 0.0)), 0.3),
+        ("ball off a corner", (BALL, at(1.5, 1.5, 1.5)), (CUBE, at(0.0, 0.0, 0.0)), 3.0_f64.sqrt() - 0.1),
+        ("ball inside", (BALL, at(0.0, 0.0, 0.3)), (CUBE, at(0.0, 0.0, 0.0)), -0.3),
+        ("rod along a face", (ROD, at(0.8, 0.0, 0.0)), (CUBE, at(0.0, 0.0, 0.0)), 0.2),
+        ("rod through a cube", (ROD, at(0.3, 0.0, 0.0)), (CUBE, at(0.0, 0.0, 0.0)), -0.3),
+        ("rod end over a face", (ROD, at(0.1, 0.2, 1.2)), (CUBE, at(0.0, 0.0, 0.0)), 0.1),
+    ];
+    for (name, a, b, expected) in cases {
+        let found = distance(a, b);
+        assert!((found - expected).abs() < 1e-9, "{name}: {found}, not {expected}");
+    }
+}
+
+#[test]
+fn a_cylinder_is_at_most_its_prism_too_large() {
+    let cylinder = Shape::Cylinder { radius: 0.2, half_length: 0.4 };
+    for step in 0..48 {
+        let angle = f64::from(step) * std::f64::consts::TAU / 48.0;
+        let side = distance((cylinder, at(0.0, 0.0, 0.0)), (BALL, at(angle.cos(), angle.sin(), 0.1)));
+        assert!(side <= 0.7 + 1e-9 && side > 0.7 - 0.2 * 0.0353, "{angle}: {side}");
+    }
+    let top = distance((cylinder, at(0.0, 0.0, 0.0)), (BALL, at(0.05, 0.02, 1.0)));
+    assert!((top - 0.5).abs() < 1e-9, "{top}");
+}
+
+#[test]
+fn heights_over_the_floor() {
+    let over = |shape, pose| Convex::new(&shape, &pose).height_above(0.25);
+    let lying = pose([0.0, 0.0, 0.5], [1.0, 1.0, 0.0, 0.0]);
+    assert!((over(BALL, at(1.0, 2.0, 1.0)) - 0.65).abs() < 1e-12);
+    assert!((over(ROD, at(0.0, 0.0, 1.0)) - 0.15).abs() < 1e-12);
+    assert!((over(ROD, lying) - 0.15).abs() < 1e-12);
+    assert!((over(CUBE, at(0.0, 0.0, 0.5)) + 0.25).abs() < 1e-12);
+    let on_edge = pose([0.0, 0.0, 1.0], [(std::f64::consts::FRAC_PI_8).cos(), (std::f64::consts::FRAC_PI_8).sin(), 0.0, 0.0]);
+    assert!((over(CUBE, on_edge) - (0.75 - std::f64::consts::FRAC_1_SQRT_2)).abs() < 1e-9);
+}
+
+/// The nearest point of a solid to a point, straight from the definition of the shape; cylinders exact.
+fn project(shape: &Shape, world_from_shape: &Pose, point: &Point3<f64>) -> Point3<f64> {
+    let p = world_from_shape.inverse_transform_point(point);
+    let toward = |core: Point3<f64>, radius: f64| {
+        let away = p - core;
+        if away.norm() <= radius { p } else { core + away * (radius / away.norm()) }
+    };
+    let local = match *shape {
+        Shape::Sphere { radius } => toward(Point3::origin(), radius),
+        Shape::Capsule { radius, half_length } => toward(Point3::new(0.0, 0.0, p.z.clamp(-half_length, half_length)), radius),
+        Shape::Cylinder { radius, half_length } => {
+            let out = p.x.hypot(p.y);
+            let shrink = if out > radius { radius / out } else { 1.0 };
+            Point3::new(p.x * shrink, p.y * shrink, p.z.clamp(-half_length, half_length))
+        }
+        Shape::Box { half_extents: [x, y, z] } => Point3::new(p.x.clamp(-x, x), p.y.clamp(-y, y), p.z.clamp(-z, z)),
+    };
+    world_from_shape * local
+}
+
+/// Distance by alternating projections (von Neumann): slow, but shares nothing with the code under test.
+fn slow_distance(a: &(Shape, Pose), b: &(Shape, Pose)) -> f64 {
+    let mut q = Point3::from(b.1.translation.vector);
+    let mut last = f64::INFINITY;
+    for _ in 0..200_000 {
+        let p = project(&a.0, &a.1, &q);
+        q = project(&b.0, &b.1, &p);
+        let gap = (p - q).norm();
+        if last - gap < 1e-13 {
+            return gap;
+        }
+        last = gap;
+    }
+    last
+}
+
+fn shapes() -> impl Strategy<Value = Shape> {
+    let size = 0.02..0.4_f64;
+    prop_oneof![
+        size.clone().prop_map(|radius| Shape::Sphere { radius }),
+        (size.clone(), size.clone()).prop_map(|(radius, half_length)| Shape::Capsule { radius, half_length }),
+        [size.clone(), size.clone(), size].prop_map(|half_extents| Shape::Box { half_extents }),
+    ]
+}
+
+fn poses(spread: f64) -> impl Strategy<Value = Pose> {
+    let unit = -1.0..1.0_f64;
+    let turn = [unit.clone(), unit.clone(), unit.clone(), unit.clone()];
+    ([unit.clone(), unit.clone(), unit], turn)
+        .prop_filter("a rotation", |(_, turn)| turn.iter().map(|x| x * x).sum::<f64>() > 0.01)
+        .prop_map(move |(position, turn)| pose(position.map(|x| x * spread), turn))
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 2000, max_global_rejects: 20_000, failure_persistence: None, ..ProptestConfig::default() })]
+
+    #[test]
+    fn distances_agree_with_alternating_projections(a in (shapes(), poses(1.0)), b in (shapes(), poses(1.0))) {
+        let found = distance(a, b);
+        let slow = slow_distance(&a, &b);
+        // the slow search only ever comes from above, and stalls where two faces are nearly parallel
+        prop_assert!(found.max(0.0) <= slow + 1e-9 && found.max(0.0) > slow - 2e-3, "{found} against {slow}");
+    }
+
+    #[test]
+    fn the_depth_is_the_shortest_way_out(a in (shapes(), poses(0.2)), b in (shapes(), poses(0.2))) {
+        let depth = -distance(a, b);
+        prop_assume!(depth > 1e-3);
+        let (first, mut stream) = (Convex::new(&a.0, &a.1), Stream::new(depth.to_bits(), &[]));
+        let moved = |by: Vector3<f64>| first.signed_distance(&Convex::new(&b.0, &(Pose::from_parts(by.into(), Default::default()) * b.1)));
+        let mut freed = f64::NEG_INFINITY;
+        for _ in 0..300 {
+            let way = Vector3::new(stream.normal(), stream.normal(), stream.normal()).normalize();
+            prop_assert!(moved(way * depth * 0.999) < 0.0, "no shorter way out, but {way:?}");
+            freed = freed.max(moved(way * depth * 1.05));
+        }
+        prop_assert!(freed > -0.05 * depth, "some way of about that length leads out, best {freed} of {depth}");
+    }
+}
