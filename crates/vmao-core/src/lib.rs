@@ -4,10 +4,13 @@
 //! contacts, grasp orders and outcomes. This crate knows nothing of the simulator, of tensors, of files,
 //! of the clock or of threads.
 
+pub mod catalogue;
 pub mod collision;
 pub mod contact;
+pub mod contact_model;
 pub mod distance;
 pub mod geometry;
+pub mod gripper_pose;
 pub mod inverse_kinematics;
 pub mod kinematics;
 pub mod object;
@@ -15,10 +18,12 @@ pub mod object_centric;
 pub mod object_graph;
 pub mod observation;
 pub mod order;
+pub mod osc;
 pub mod outcome;
 pub mod planning;
 pub mod random;
 pub mod record;
+pub mod robots;
 pub mod rollout;
 pub mod shape;
 pub mod time_parameterization;

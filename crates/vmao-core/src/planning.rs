@@ -8,6 +8,7 @@ use crate::{
     random::Stream,
     time_parameterization::{MotionLimits, Trajectory},
 };
+use std::fmt;
 
 /// How hard to look for a path and how closely to check it.
 #[derive(Debug, Clone, PartialEq)]
@@ -53,6 +54,17 @@ pub enum PlanFailure {
     OutOfLimits,
     /// No path was found in `max_iterations` samples; this does not say that there is none.
     BudgetExhausted,
+}
+
+impl fmt::Display for PlanFailure {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::StartInCollision(pair) => write!(f, "at the start, {pair}"),
+            Self::GoalInCollision(pair) => write!(f, "at the end, {pair}"),
+            Self::OutOfLimits => write!(f, "start or end outside the joint limits"),
+            Self::BudgetExhausted => write!(f, "no path within the budget of samples"),
+        }
+    }
 }
 
 /// A collision-free path of all arms from `start` to `goal` (flat, arm after arm, rad).

@@ -43,3 +43,28 @@ pub struct Solid {
     /// Red, green, blue in [0, 1].
     pub color: [f32; 3],
 }
+
+impl Shape {
+    /// Its volume (m³).
+    pub fn volume(&self) -> f64 {
+        use std::f64::consts::PI;
+        match *self {
+            Self::Sphere { radius } => 4.0 / 3.0 * PI * radius.powi(3),
+            Self::Capsule { radius, half_length } => PI * radius * radius * (2.0 * half_length + 4.0 / 3.0 * radius),
+            Self::Cylinder { radius, half_length } => 2.0 * PI * radius * radius * half_length,
+            Self::Box { half_extents: [x, y, z] } => 8.0 * x * y * z,
+        }
+    }
+}
+
+impl Shape {
+    /// How far the solid reaches from its centre along a unit `direction` of its own frame (m).
+    pub fn extent_along(&self, direction: &nalgebra::Vector3<f64>) -> f64 {
+        match *self {
+            Self::Sphere { radius } => radius,
+            Self::Capsule { radius, half_length } => radius + half_length * direction.z.abs(),
+            Self::Cylinder { radius, half_length } => radius * direction.xy().norm() + half_length * direction.z.abs(),
+            Self::Box { half_extents: [x, y, z] } => x * direction.x.abs() + y * direction.y.abs() + z * direction.z.abs(),
+        }
+    }
+}

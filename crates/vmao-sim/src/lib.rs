@@ -1,1 +1,24 @@
-//! placeholder
+//! Physics: scenes, cameras, control and the one trial loop, on MuJoCo. Knows nothing of tensors.
+
+mod attempt;
+mod cameras;
+mod convention;
+mod error;
+mod execution;
+mod failure;
+mod grasping;
+mod mjcf;
+mod planning_world;
+mod recorder;
+mod scene;
+mod simulation;
+mod task;
+mod trial;
+
+pub use cameras::CameraConfig;
+pub use error::Error;
+pub use execution::MotionConfig;
+pub use grasping::GraspConfig;
+pub use scene::{Friction, Layout, Scene, SceneConfig};
+pub use task::{GoalConfig, StartConfig, Thresholds};
+pub use trial::{Recording, Trial, TrialConfig, run_trial};

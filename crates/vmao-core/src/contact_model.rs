@@ -1,0 +1,77 @@
+//! Where to touch: the one interface that exploration, V-MAO, Top-1 and demonstrations share.
+
+use crate::contact::{ContactTuple, PartId};
+use crate::geometry::Pose;
+use crate::observation::{Observation, PointLabel};
+use crate::random::Stream;
+use nalgebra::Point3;
+
+/// What a contact model is asked: the scene as it is before a grasp.
+#[derive(Debug, Clone, Copy)]
+pub struct ContactQuery<'a> {
+    /// Which grasp of the trial this is, from zero.
+    pub grasp: usize,
+    /// The part to hold.
+    pub part: PartId,
+    /// The scene now, world frame.
+    pub observation: &'a Observation,
+    /// Where the part is. Exploration knows it; learned models must not look.
+    pub world_from_part: &'a Pose,
+}
+
+/// Proposes where the two fingers of the next grasp shall touch.
+pub trait ContactModel: Sync {
+    /// World points for finger 1 and finger 2, or `None` if the model sees nowhere to touch.
+    fn propose(&self, query: &ContactQuery<'_>, stream: &mut Stream) -> Option<[Point3<f64>; 2]>;
+}
+
+/// Algorithm 1's proposal: each point of a known tuple, moved to a random cloud point of the same part nearby.
+#[derive(Debug, Clone)]
+pub struct JitteredTuple {
+    /// The tuple drawn from the successes so far.
+    pub tuple: ContactTuple,
+    /// Neighbourhood radius r (m); the cloud's nearest point is taken if it holds none.
+    pub radius: f64,
+}
+
+impl ContactModel for JitteredTuple {
+    fn propose(&self, query: &ContactQuery<'_>, stream: &mut Stream) -> Option<[Point3<f64>; 2]> {
+        let contact = self.tuple.iter().find(|contact| contact.part == query.part)?;
+        let mut fingers = [Point3::origin(); 2];
+        for (finger, point) in fingers.iter_mut().zip(&contact.fingers) {
+            let center = query.world_from_part * point;
+            *finger = neighbour(query.observation, query.part, &center, self.radius, stream)?;
+        }
+        Some(fingers)
+    }
+}
+
+/// A uniformly drawn point of `part` within `radius` of `center`.
+fn neighbour(
+    observation: &Observation,
+    part: PartId,
+    center: &Point3<f64>,
+    radius: f64,
+    stream: &mut Stream,
+) -> Option<Point3<f64>> {
+    let near: Vec<Point3<f64>> = observation
+        .points
+        .iter()
+        .zip(&observation.labels)
+        .filter(|(_, label)| **label == PointLabel::Part(part.0))
+        .map(|(point, _)| Point3::from(point.map(f64::from)))
+        .filter(|point| (point - center).norm() < radius)
+        .collect();
+    if near.is_empty() { None } else { Some(near[stream.index(near.len())]) }
+}
+
+/// A tuple used as it is: demonstrations, and recorded trials run again.
+#[derive(Debug, Clone)]
+pub struct FixedTuple(pub ContactTuple);
+
+impl ContactModel for FixedTuple {
+    fn propose(&self, query: &ContactQuery<'_>, _stream: &mut Stream) -> Option<[Point3<f64>; 2]> {
+        let contact = self.0.iter().find(|contact| contact.part == query.part)?;
+        Some(contact.fingers.map(|point| query.world_from_part * point))
+    }
+}

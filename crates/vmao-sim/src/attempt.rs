@@ -1,0 +1,451 @@
+//! The steps of one trial. Each method is one line of the algorithm; [`crate::trial`] strings them together.
+
+use crate::cameras::observe;
+use crate::failure::Failure;
+use crate::grasping::{Grasp, MAX_JOINT_STEP, compatible_grasps, ik_settings, joint_positions_with, reachable_grasps};
+use crate::planning_world::{Obstacles, collision_world};
+use crate::recorder::Recorder;
+use crate::scene::Scene;
+use crate::simulation::{Grip, Simulation};
+use crate::task::{goal_errors, sample_goal, sample_start, threshold_factor};
+use crate::trial::{Recording, Trial, TrialConfig};
+use nalgebra::Point3;
+use std::ops::Range;
+use vmao_core::collision::CollisionChecker;
+use vmao_core::contact::{ArmId, Contact, PartId};
+use vmao_core::contact_model::{ContactModel, ContactQuery};
+use vmao_core::geometry::{Pose, rotation_distance};
+use vmao_core::inverse_kinematics::track;
+use vmao_core::object::{ObjectGoal, ObjectState};
+use vmao_core::object_centric::{ObjectTrajectory, part_poses};
+use vmao_core::object_graph::ObjectGraph;
+use vmao_core::order::GraspOrder;
+use vmao_core::outcome::{FailureStage, TrialOutcome};
+use vmao_core::planning::{PlanOutcome, PlanSettings, plan, time_path};
+use vmao_core::random::Stream;
+use vmao_core::record::{GraspRecord, TrialRecord};
+use vmao_core::time_parameterization::{MotionLimits, Trajectory};
+
+/// Random streams of a trial, each its own so that two methods meet the same scene and goal.
+#[derive(Clone, Copy)]
+enum Draw {
+    Start = 0,
+    Goal,
+    Look,
+    Contacts,
+    Reach,
+    Plan,
+}
+
+/// Longest time an object may take to come to rest (s), and the speed below which it rests.
+const SETTLE_SECONDS: f64 = 1.0;
+const REST_SPEED: f64 = 2e-3;
+/// Time for the controllers to settle after a motion between grasps, and after the last one (s).
+const SETTLE_AFTER_MOTION: f64 = 0.3;
+const SETTLE_AT_GOAL: f64 = 0.5;
+/// First leg of the alternative route: straight up by this much (m).
+const LIFT_FIRST: f64 = 0.07;
+
+/// Joint trajectories to the stand-offs and from there to the grasps.
+pub(crate) struct Approach {
+    way: Trajectory,
+    last_stretch: Trajectory,
+}
+
+/// A trial under way.
+pub(crate) struct Attempt<'a> {
+    scene: &'a Scene,
+    config: &'a TrialConfig,
+    simulation: Simulation<'a>,
+    graph: ObjectGraph,
+    order: GraspOrder,
+    seed: u64,
+    index: u64,
+    /// Which arm grasps each part.
+    arms: Vec<ArmId>,
+    start: ObjectState,
+    goal: ObjectGoal,
+    goal_parts: Vec<Pose>,
+    held: Vec<(ArmId, PartId)>,
+    grasps: Vec<GraspRecord>,
+    errors: [f64; 3],
+    /// Worst ratio of error to threshold while the goal was to be held.
+    factor: f64,
+}
+
+impl<'a> Attempt<'a> {
+    /// Lays the object on the table, lets it settle, and draws the goal.
+    pub(crate) fn begin(
+        scene: &'a Scene,
+        config: &'a TrialConfig,
+        order: GraspOrder,
+        (seed, index): (u64, u64),
+        recording: Recording,
+    ) -> Self {
+        let draw = |draw: Draw| Stream::new(seed, &[index, draw as u64]);
+        let (world_from_root, joints) = sample_start(scene, &config.start, &mut draw(Draw::Start));
+        let mut simulation = Simulation::new(scene, config.osc, &world_from_root, &joints);
+        for tick in 0..(SETTLE_SECONDS / scene.timestep) as usize {
+            simulation.tick();
+            if tick > 50 && simulation.object_speed() < REST_SPEED {
+                break;
+            }
+        }
+        let graph = scene.graph.clone();
+        let start = simulation.object_state();
+        let goal = sample_goal(scene, &config.goal, &start, scene.root, &mut draw(Draw::Goal));
+        let goal_parts = part_poses(&scene.object, &graph, goal.root, &goal.world_from_root, &goal.joint_positions);
+        if recording == Recording::On {
+            simulation.recorder = Some(Recorder::new(scene, goal_parts.clone()));
+        }
+        let errors = goal_errors(scene, &goal_parts, &goal, &start);
+        let arms = nearest_arms(scene, &start);
+        let (held, grasps) = (Vec::new(), Vec::new());
+        Self {
+            scene,
+            config,
+            simulation,
+            graph,
+            order,
+            seed,
+            index,
+            arms,
+            start,
+            goal,
+            goal_parts,
+            held,
+            grasps,
+            errors,
+            factor: f64::INFINITY,
+        }
+    }
+
+    /// Number of parts to take hold of.
+    pub(crate) fn part_count(&self) -> usize {
+        self.scene.object.parts.len()
+    }
+
+    fn stream(&self, draw: Draw) -> Stream {
+        Stream::new(self.seed, &[self.index, draw as u64, self.held.len() as u64])
+    }
+
+    fn note(&mut self, label: String) {
+        let time = self.simulation.time();
+        if let Some(recorder) = &mut self.simulation.recorder {
+            recorder.event(time, label);
+        }
+    }
+
+    /// Where the object shall go once the first `count` parts are held: those to their goal, joints to others as they are.
+    pub(crate) fn step_goal(&self, count: usize) -> ObjectGoal {
+        let now = self.simulation.object_state();
+        let held = |part: PartId| usize::from(part.0) < count;
+        let joints = self.scene.object.joints.iter().enumerate();
+        let joint_positions = joints
+            .map(|(index, joint)| {
+                let positions =
+                    if held(joint.parent) && held(joint.child) { &self.goal.joint_positions } else { &now.joint_positions };
+                positions[index]
+            })
+            .collect();
+        let root = if held(self.goal.root) { self.goal.root } else { PartId(0) };
+        ObjectGoal { root, world_from_root: self.goal_parts[usize::from(root.0)], joint_positions }
+    }
+
+    /// Looks at the scene and asks the model for the contacts of the grasps `step`.
+    pub(crate) fn propose_contacts(
+        &mut self,
+        model: &dyn ContactModel,
+        step: Range<usize>,
+    ) -> Result<Vec<[Point3<f64>; 2]>, Failure> {
+        let mut stream = self.stream(Draw::Look);
+        let observation = observe(&mut self.simulation, &self.config.cameras, &mut stream);
+        let state = self.simulation.object_state();
+        let mut contacts = Vec::new();
+        for grasp in step {
+            let part = PartId(grasp as u16);
+            let world_from_part = state.world_from_parts[grasp];
+            let query = ContactQuery { grasp, part, observation: &observation, world_from_part: &world_from_part };
+            let mut stream = Stream::new(self.seed, &[self.index, Draw::Contacts as u64, grasp as u64]);
+            let fingers = model
+                .propose(&query, &mut stream)
+                .ok_or_else(|| Failure::new(FailureStage::NoContact, format!("nothing to touch was seen on part {grasp}")))?;
+            let contact = Contact { part, fingers: fingers.map(|point| world_from_part.inverse_transform_point(&point)) };
+            let (arm, observation) = (self.arms[grasp], observation.clone());
+            self.grasps.push(GraspRecord { arm, contact, observation, world_from_part, world_from_gripper: None });
+            let time = self.simulation.time();
+            if let Some(recorder) = &mut self.simulation.recorder {
+                recorder.rollout.contacts.push((time, arm.0, fingers[0].into(), fingers[1].into()));
+            }
+            contacts.push(fingers);
+        }
+        Ok(contacts)
+    }
+
+    /// Gripper poses for these contacts that all arms reach, carry to the step's goal, and take without meeting; best first.
+    pub(crate) fn choose_grasps(&mut self, contacts: &[[Point3<f64>; 2]]) -> Result<Vec<Vec<Grasp>>, Failure> {
+        let first = self.held.len();
+        let goal = self.step_goal(first + contacts.len());
+        let poses = self.waypoints(&self.trajectory(goal));
+        let mut stream = self.stream(Draw::Reach);
+        let mut candidates = Vec::new();
+        for (grasp, fingers) in contacts.iter().enumerate() {
+            let (arm, part) = (self.arms[first + grasp], PartId((first + grasp) as u16));
+            let motion: Vec<Pose> = poses.iter().map(|parts| parts[usize::from(part.0)]).collect();
+            candidates.push(reachable_grasps(&self.simulation, &self.config.grasp, (arm, part), fingers, &motion, &mut stream)?);
+        }
+        compatible_grasps(&self.simulation, &self.config.grasp, &candidates, &self.holders())
+    }
+
+    /// The first of these grasps that a collision-free motion of all its arms together leads to.
+    pub(crate) fn plan_approach(&mut self, choices: Vec<Vec<Grasp>>) -> Result<(Vec<Grasp>, Approach), Failure> {
+        let mut stream = self.stream(Draw::Plan);
+        let mut why = String::new();
+        for grasps in choices {
+            match self.approach_to(&grasps, &mut stream) {
+                Ok(approach) => return Ok((grasps, approach)),
+                Err(cause) => why = cause,
+            }
+        }
+        Err(Failure::new(FailureStage::NoPlan, why))
+    }
+
+    fn approach_to(&self, grasps: &[Grasp], stream: &mut Stream) -> Result<Approach, String> {
+        let mut openings: Vec<f64> = (0..self.scene.robots.len()).map(|arm| self.simulation.opening(arm)).collect();
+        for grasp in grasps {
+            openings[usize::from(grasp.arm.0)] = grasp.opening;
+        }
+        let chosen: Vec<&Grasp> = grasps.iter().collect();
+        let start = joint_positions_with(&self.simulation, &[], |grasp| grasp.standoff());
+        let standoff = joint_positions_with(&self.simulation, &chosen, |grasp| grasp.standoff());
+        let world = collision_world(&self.simulation, &openings, &Obstacles::Parts(&self.holders()));
+        let moving: Vec<usize> = grasps.iter().map(|grasp| usize::from(grasp.arm.0)).collect();
+        let frozen_arms = (0..self.scene.robots.len()).filter(|arm| !moving.contains(arm)).collect();
+        let settings =
+            PlanSettings { margin: self.config.grasp.plan_margin, frozen_arms, max_iterations: 4000, ..PlanSettings::default() };
+        let path = match plan(&world, &start, &standoff, &settings, stream) {
+            PlanOutcome::Path(path) => path,
+            PlanOutcome::Failed(failure) => return Err(failure.to_string()),
+        };
+        let limits = self.limits(1.0);
+        let way = time_path(&world, &path, &limits, self.config.grasp.plan_margin * 0.5).ok_or("no free way to time the path")?;
+        let stretch: Vec<Vec<f64>> = (0..grasps[0].approach.len())
+            .map(|i| {
+                let mut q = standoff.clone();
+                for grasp in grasps {
+                    let first = 7 * usize::from(grasp.arm.0);
+                    q[first..first + 7].copy_from_slice(&grasp.approach[i]);
+                }
+                q
+            })
+            .collect();
+        let last_stretch = Trajectory::new(&stretch, &self.limits(self.config.motion.approach_share), 0.01);
+        Ok(Approach { way, last_stretch })
+    }
+
+    fn limits(&self, share: f64) -> MotionLimits {
+        let joints = || self.scene.robots.iter().flat_map(|robot| &robot.joints);
+        let motion = &self.config.motion;
+        MotionLimits {
+            velocity: joints().map(|joint| joint.max_velocity * motion.velocity_share * share).collect(),
+            acceleration: joints().map(|joint| joint.max_acceleration * motion.acceleration_share * share).collect(),
+        }
+    }
+
+    /// Opens the grippers, goes to the stand-offs and straight on to the grasps.
+    pub(crate) fn approach(&mut self, grasps: &[Grasp], approach: &Approach) -> Result<(), Failure> {
+        let moving: Vec<(ArmId, PartId)> = grasps.iter().map(|grasp| (grasp.arm, grasp.part)).collect();
+        for grasp in grasps {
+            let part = &self.scene.object.parts[usize::from(grasp.part.0)].name;
+            self.note(format!("arm {} reaches for {part}", grasp.arm.0));
+            self.simulation.grips[usize::from(grasp.arm.0)] = Grip::Open(grasp.opening);
+            self.grasps[usize::from(grasp.part.0)].world_from_gripper = Some(grasp.world_from_tool);
+        }
+        self.simulation.follow(&approach.way, &moving, &self.config.motion)?;
+        self.simulation.follow(&approach.last_stretch, &moving, &self.config.motion)
+    }
+
+    /// Closes the grippers and checks by contact that each holds its part.
+    pub(crate) fn take_hold(&mut self, grasps: &[Grasp]) -> Result<(), Failure> {
+        self.note("close".to_owned());
+        self.simulation.close(grasps, &self.config.grasp)?;
+        self.held.extend(grasps.iter().map(|grasp| (grasp.arm, grasp.part)));
+        Ok(())
+    }
+
+    /// Moves the object by object-centric control with all arms that hold it: straight to the step's goal, or up first.
+    pub(crate) fn move_object(&mut self) -> Result<(), Failure> {
+        let goal = self.step_goal(self.held.len());
+        let last = self.held.len() == self.part_count();
+        let mut up_first = self.step_goal(self.held.len());
+        let now = self.simulation.object_state();
+        up_first.world_from_root = Pose::translation(0.0, 0.0, LIFT_FIRST) * now.world_from_parts[usize::from(goal.root.0)];
+        up_first.joint_positions.clone_from(&now.joint_positions);
+        let routes = [vec![goal.clone()], vec![up_first, goal]];
+        let mut blocked = Failure::new(FailureStage::NoPlan, "no route");
+        for route in routes {
+            match self.plan_carry(&route[0]) {
+                Err(failure) => blocked = failure,
+                Ok(_) => {
+                    let legs = route.len();
+                    for (leg, goal) in route.into_iter().enumerate() {
+                        let extra = if leg + 1 < legs {
+                            0.0
+                        } else if last {
+                            SETTLE_AT_GOAL + self.config.thresholds.hold_seconds
+                        } else {
+                            SETTLE_AFTER_MOTION
+                        };
+                        self.carry_to(&goal, extra)?;
+                    }
+                    return Ok(());
+                }
+            }
+        }
+        Err(blocked)
+    }
+
+    fn carry_to(&mut self, goal: &ObjectGoal, extra: f64) -> Result<(), Failure> {
+        let (trajectory, postures) = self.plan_carry(goal)?;
+        self.note(format!("move the object, {} held", self.held.len()));
+        let hold_from = trajectory.duration() + extra - self.config.thresholds.hold_seconds;
+        let (held, motion) = (self.held.clone(), &self.config.motion);
+        let (scene, goal_parts, wanted, thresholds) = (self.scene, &self.goal_parts, &self.goal, &self.config.thresholds);
+        let (mut worst, mut errors) = (0.0_f64, self.errors);
+        let outcome = self.simulation.carry(&trajectory, &held, &postures, extra, motion, |simulation, time| {
+            if time >= hold_from {
+                errors = goal_errors(scene, goal_parts, wanted, &simulation.object_state());
+                worst = worst.max(threshold_factor(scene, thresholds, goal_parts, wanted, &simulation.object_state()));
+            }
+        });
+        self.errors = errors;
+        self.factor = worst;
+        outcome
+    }
+
+    /// The object's trajectory to `goal` and the joint positions of each holding arm along it, free of collision.
+    fn plan_carry(&self, goal: &ObjectGoal) -> Result<(ObjectTrajectory, Vec<Vec<Vec<f64>>>), Failure> {
+        let trajectory = self.trajectory(goal.clone());
+        let waypoints = self.waypoints(&trajectory);
+        let mut postures = Vec::new();
+        for &(arm, part) in &self.held {
+            let (index, part) = (usize::from(arm.0), usize::from(part.0));
+            let base_from_world = self.scene.world_from_bases[index].inverse();
+            let part_from_tool = waypoints[0][part].inverse() * self.simulation.tool_pose(index);
+            let poses: Vec<Pose> = waypoints[1..].iter().map(|parts| base_from_world * parts[part] * part_from_tool).collect();
+            let now = self.simulation.joint_positions(index).as_slice().to_vec();
+            let way = track(&self.simulation.chains[index], &poses, &now, MAX_JOINT_STEP, &ik_settings(0)).map_err(|_| {
+                Failure::new(FailureStage::Unreachable, format!("arm {index} cannot follow the object to its goal"))
+            })?;
+            postures.push(std::iter::once(now).chain(way).collect::<Vec<_>>());
+        }
+        let openings: Vec<f64> = (0..self.scene.robots.len()).map(|arm| self.simulation.opening(arm)).collect();
+        let world = collision_world(&self.simulation, &openings, &Obstacles::Nothing);
+        let mut checker = CollisionChecker::new(&world);
+        for waypoint in 1..waypoints.len() {
+            let arms = 0..self.scene.robots.len();
+            let q: Vec<f64> = arms
+                .flat_map(|arm| match self.held.iter().position(|(held, _)| usize::from(held.0) == arm) {
+                    Some(place) => postures[place][waypoint].clone(),
+                    None => self.simulation.joint_positions(arm).as_slice().to_vec(),
+                })
+                .collect();
+            if let Some(pair) = checker.check(&q, self.config.grasp.table_clearance / 2.0) {
+                return Err(Failure::new(FailureStage::NoPlan, format!("on the way to the goal {pair}")));
+            }
+        }
+        Ok((trajectory, postures))
+    }
+
+    /// The object's trajectory from where it is now.
+    fn trajectory(&self, goal: ObjectGoal) -> ObjectTrajectory {
+        let now = self.simulation.object_state();
+        let parts = part_poses(&self.scene.object, &self.graph, goal.root, &goal.world_from_root, &goal.joint_positions);
+        let motion = &self.config.motion;
+        let mut duration = motion.shortest_motion;
+        for (from, to) in now.world_from_parts.iter().zip(&parts) {
+            let distance = (to.translation.vector - from.translation.vector).norm();
+            duration = duration.max(distance / motion.object_speed);
+            duration = duration.max(rotation_distance(&from.rotation, &to.rotation) / motion.object_turning_speed);
+        }
+        ObjectTrajectory::new(&self.scene.object, &self.graph, now, goal, duration)
+    }
+
+    fn waypoints(&self, trajectory: &ObjectTrajectory) -> Vec<Vec<Pose>> {
+        let count = self.config.motion.waypoints;
+        (0..=count).map(|i| trajectory.part_poses_at(trajectory.duration() * i as f64 / count as f64)).collect()
+    }
+
+    /// (arm, part) pairs that may touch: an arm that holds the object may touch all of it.
+    fn holders(&self) -> Vec<(usize, usize)> {
+        let parts = 0..self.part_count();
+        self.held.iter().flat_map(|(arm, _)| parts.clone().map(|part| (usize::from(arm.0), part))).collect()
+    }
+
+    /// Whether the goal was met while it was to be held.
+    pub(crate) fn goal_held(&self) -> Result<(), Failure> {
+        if self.factor <= 1.0 {
+            return Ok(());
+        }
+        let [position, rotation, joint] = self.errors;
+        let why = format!("{:.1} mm, {:.1}°, joint {:.1}° off", position * 1e3, rotation.to_degrees(), joint.to_degrees());
+        Err(Failure::new(FailureStage::Threshold, why))
+    }
+
+    /// Writes the record.
+    pub(crate) fn finish(mut self, outcome: Result<(), Failure>) -> Trial {
+        let (outcome, detail) = match outcome {
+            Ok(()) => (TrialOutcome::Success, String::new()),
+            Err(failure) => (TrialOutcome::Failed(failure.stage), failure.why),
+        };
+        let steps = self.simulation.steps;
+        let rollout = self.simulation.recorder.take().map(|recorder| {
+            let mut rollout = recorder.rollout;
+            rollout.outcome = match outcome {
+                TrialOutcome::Success => "success".to_owned(),
+                TrialOutcome::Failed(stage) => format!("{}: {detail}", stage.name()),
+            };
+            rollout
+        });
+        let (index, seed, order, start, goal, grasps) = (self.index, self.seed, self.order, self.start, self.goal, self.grasps);
+        let record = TrialRecord { index, seed, order, start, goal, grasps, outcome, detail, steps, final_errors: self.errors };
+        Trial { record, threshold_factor: self.factor, rollout }
+    }
+}
+
+/// The assignment of arms to parts that keeps the arms' bases nearest to their parts; arm i to part i among equals.
+fn nearest_arms(scene: &Scene, start: &ObjectState) -> Vec<ArmId> {
+    let count = scene.object.parts.len();
+    let middle = |part: usize| {
+        let solids = &scene.object.parts[part].solids;
+        let volume: f64 = solids.iter().map(|solid| solid.shape.volume()).sum();
+        let weighted = solids.iter().map(|solid| solid.carrier_from_solid.translation.vector * (solid.shape.volume() / volume));
+        start.world_from_parts[part] * Point3::from(weighted.sum::<nalgebra::Vector3<f64>>())
+    };
+    let distance = |arm: usize, part: usize| (middle(part).coords - scene.world_from_bases[arm].translation.vector).xy().norm();
+    let mut best = ((0..count).collect::<Vec<_>>(), f64::INFINITY);
+    permutations(count, &mut |order| {
+        let total: f64 = order.iter().enumerate().map(|(part, &arm)| distance(arm, part)).sum();
+        if total < best.1 - 1e-9 {
+            best = (order.to_vec(), total);
+        }
+    });
+    best.0.into_iter().map(|arm| ArmId(arm as u16)).collect()
+}
+
+/// Calls `visit` with every order of `0..count`, in lexicographic order.
+fn permutations(count: usize, visit: &mut dyn FnMut(&[usize])) {
+    fn extend(chosen: &mut Vec<usize>, count: usize, visit: &mut dyn FnMut(&[usize])) {
+        if chosen.len() == count {
+            visit(chosen);
+        }
+        for next in 0..count {
+            if !chosen.contains(&next) {
+                chosen.push(next);
+                extend(chosen, count, visit);
+                chosen.pop();
+            }
+        }
+    }
+    extend(&mut Vec::with_capacity(count), count, visit);
+}

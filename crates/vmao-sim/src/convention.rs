@@ -1,0 +1,80 @@
+//! The one place where MuJoCo's conventions meet ours: quaternion order, twist order, array layouts.
+
+use mujoco_rs::wrappers::mj_data::MjData;
+use mujoco_rs::wrappers::mj_model::MjModel;
+use nalgebra::{Matrix3, Vector3};
+use std::sync::Arc;
+use vmao_core::geometry::{Pose, pose, position_quaternion};
+use vmao_core::osc::{Jacobian, JointVector, MassMatrix};
+use vmao_core::robots::Inertial;
+use vmao_core::shape::Shape;
+
+/// The simulator's state type used throughout this crate.
+pub(crate) type Data = MjData<Arc<MjModel>>;
+
+/// World pose of body `body`.
+pub(crate) fn body_pose(data: &Data, body: usize) -> Pose {
+    pose(data.xpos()[body], data.xquat()[body])
+}
+
+/// Our poses as the seven numbers of a MuJoCo free joint: position, then quaternion w, x, y, z.
+pub(crate) fn free_joint_position(pose: &Pose) -> [f64; 7] {
+    let ([x, y, z], [qw, qx, qy, qz]) = position_quaternion(pose);
+    [x, y, z, qw, qx, qy, qz]
+}
+
+/// Jacobian at a world point of a chain of hinges with these MuJoCo joint ids: linear rows, then angular.
+pub(crate) fn hinge_jacobian(data: &Data, joints: &[usize], point: &Vector3<f64>) -> Jacobian {
+    let mut jacobian = Jacobian::zeros();
+    for (column, &joint) in joints.iter().enumerate() {
+        let axis = Vector3::from(data.xaxis()[joint]);
+        let linear = axis.cross(&(point - Vector3::from(data.xanchor()[joint])));
+        jacobian.fixed_view_mut::<3, 1>(0, column).copy_from(&linear);
+        jacobian.fixed_view_mut::<3, 1>(3, column).copy_from(&axis);
+    }
+    jacobian
+}
+
+/// The arm's block of MuJoCo's full mass matrix (row-major, `nv` × `nv`), whose dofs start at `first`.
+pub(crate) fn mass_block(full: &[f64], nv: usize, first: usize) -> MassMatrix {
+    MassMatrix::from_fn(|row, column| full[(first + row) * nv + first + column])
+}
+
+/// Seven consecutive numbers of a MuJoCo array.
+pub(crate) fn joint_vector(values: &[f64], first: usize) -> JointVector {
+    JointVector::from_iterator(values[first..first + 7].iter().copied())
+}
+
+/// MJCF attributes of a pose.
+pub(crate) fn pose_attributes(pose: &Pose) -> String {
+    let ([x, y, z], [qw, qx, qy, qz]) = position_quaternion(pose);
+    format!(r#"pos="{x} {y} {z}" quat="{qw} {qx} {qy} {qz}""#)
+}
+
+/// MJCF attributes of a shape. MuJoCo's capsules and cylinders lie along z, as ours.
+pub(crate) fn shape_attributes(shape: &Shape) -> String {
+    match *shape {
+        Shape::Sphere { radius } => format!(r#"type="sphere" size="{radius}""#),
+        Shape::Capsule { radius, half_length } => format!(r#"type="capsule" size="{radius} {half_length}""#),
+        Shape::Cylinder { radius, half_length } => format!(r#"type="cylinder" size="{radius} {half_length}""#),
+        Shape::Box { half_extents: [x, y, z] } => format!(r#"type="box" size="{x} {y} {z}""#),
+    }
+}
+
+/// MJCF element of mass properties. MuJoCo orders full inertias xx yy zz xy xz yz.
+pub(crate) fn inertial_element(inertial: &Inertial) -> String {
+    let Inertial { mass, center, inertia } = inertial;
+    let m: &Matrix3<f64> = inertia;
+    format!(
+        r#"<inertial mass="{mass}" pos="{} {} {}" fullinertia="{} {} {} {} {} {}"/>"#,
+        center.x,
+        center.y,
+        center.z,
+        m[(0, 0)],
+        m[(1, 1)],
+        m[(2, 2)],
+        m[(0, 1)],
+        m[(0, 2)],
+        m[(1, 2)]
+    )
+}

@@ -1,0 +1,65 @@
+//! Watches a simulation and keeps its motion for the viewer.
+
+use crate::convention::body_pose;
+use crate::scene::Scene;
+use crate::simulation::Simulation;
+use vmao_core::geometry::Pose;
+use vmao_core::observation::PointLabel;
+use vmao_core::rollout::{Rollout, RolloutBody, RolloutEvent};
+
+/// Frames are kept at this interval (s).
+const FRAME_SECONDS: f64 = 0.04;
+
+/// Collects a [`Rollout`] while a trial runs.
+#[derive(Debug)]
+pub(crate) struct Recorder {
+    pub(crate) rollout: Rollout,
+    bodies: Vec<usize>,
+    every: u64,
+}
+
+impl Recorder {
+    /// A recorder of all arms and parts of `scene`; `goal` holds the parts' goal poses.
+    pub(crate) fn new(scene: &Scene, goal: Vec<Pose>) -> Self {
+        let mut bodies = Vec::new();
+        let mut described = Vec::new();
+        for (arm, (index, robot)) in scene.arms.iter().zip(&scene.robots).enumerate() {
+            let gripper = &robot.gripper;
+            let mut links = vec![(robot.base.name, robot.base.solids.clone())];
+            links.extend(robot.joints.iter().map(|joint| (joint.link.name, joint.link.solids.clone())));
+            links.push((gripper.hand.name, gripper.hand.solids.clone()));
+            links.extend(gripper.fingers.iter().map(|finger| {
+                let mut solids = finger.link.solids.clone();
+                solids.push(finger.pad.clone());
+                (finger.link.name, solids)
+            }));
+            for (&body, (name, solids)) in index.bodies.iter().zip(links) {
+                bodies.push(body);
+                described.push(RolloutBody { name: format!("arm{arm}/{name}"), label: PointLabel::Arm(arm as u16), solids });
+            }
+        }
+        for (part, (&body, description)) in scene.part_bodies.iter().zip(&scene.object.parts).enumerate() {
+            bodies.push(body);
+            described.push(RolloutBody {
+                name: description.name.clone(),
+                label: PointLabel::Part(part as u16),
+                solids: description.solids.clone(),
+            });
+        }
+        let every = (FRAME_SECONDS / scene.timestep).round().max(1.0) as u64;
+        let rollout = Rollout { bodies: described, frame_seconds: every as f64 * scene.timestep, goal, ..Rollout::default() };
+        Self { rollout, bodies, every }
+    }
+
+    /// Keeps a frame if it is time for one.
+    pub(crate) fn observe(&mut self, simulation: &Simulation<'_>) {
+        if simulation.steps % self.every == 0 {
+            self.rollout.frames.push(self.bodies.iter().map(|&body| body_pose(&simulation.data, body)).collect());
+        }
+    }
+
+    /// Notes that a stage begins.
+    pub(crate) fn event(&mut self, time: f64, label: String) {
+        self.rollout.events.push(RolloutEvent { time, label });
+    }
+}

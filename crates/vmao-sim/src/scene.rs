@@ -1,0 +1,239 @@
+//! A scene: arms around a table, one object, the compiled simulator model and who owns which of its geoms.
+
+use crate::error::Error;
+use crate::mjcf;
+
+use mujoco_rs::wrappers::mj_model::{MjModel, MjtObjBase};
+use serde::{Deserialize, Serialize};
+use std::sync::Arc;
+use vmao_core::contact::{ArmId, PartId};
+use vmao_core::geometry::Pose;
+use vmao_core::object::ArticulatedObject;
+use vmao_core::object_graph::ObjectGraph;
+use vmao_core::osc::{JOINTS, JointVector};
+use vmao_core::robots::RobotModel;
+
+/// Coulomb friction coefficients of a surface. In a contact the larger of the two surfaces' values counts.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Friction {
+    /// Sliding (–).
+    pub sliding: f64,
+    /// Torsional (m).
+    pub torsional: f64,
+    /// Rolling (m).
+    pub rolling: f64,
+}
+
+impl Friction {
+    pub(crate) fn mjcf(&self) -> String {
+        format!("{} {} {}", self.sliding, self.torsional, self.rolling)
+    }
+}
+
+/// How the arms stand around the table.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Layout {
+    /// Alternately on both long sides, facing each other.
+    Opposed,
+}
+
+/// Physics and placement of a scene.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct SceneConfig {
+    /// How the arms stand.
+    pub layout: Layout,
+    /// Distance of the bases from the table's centre line (m).
+    pub base_distance: f64,
+    /// Distance between neighbours on one side (m).
+    pub base_spacing: f64,
+    /// Simulated time per step (s).
+    pub timestep: f64,
+    /// MuJoCo's `impratio`: how much stiffer friction is than the normal direction.
+    pub friction_impedance_ratio: f64,
+    /// MuJoCo's `noslip_iterations`.
+    pub noslip_iterations: u32,
+    /// Friction of the gripper pads.
+    pub pad_friction: Friction,
+    /// Friction of the object.
+    pub object_friction: Friction,
+    /// Friction of the table.
+    pub table_friction: Friction,
+    /// Friction of the arms' links.
+    pub link_friction: Friction,
+}
+
+/// Who owns a geom.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Owner {
+    Table,
+    Link(ArmId),
+    Pad(ArmId, usize),
+    Part(PartId),
+}
+
+/// Simulator indices of an arm.
+#[derive(Debug, Clone)]
+pub(crate) struct ArmIndex {
+    /// Joint ids of the seven joints.
+    pub(crate) joints: Vec<usize>,
+    /// Addresses of the first joint and of finger 1 in qpos, qvel and ctrl.
+    pub(crate) qpos: usize,
+    pub(crate) dof: usize,
+    pub(crate) ctrl: usize,
+    pub(crate) finger_qpos: usize,
+    pub(crate) finger_dof: usize,
+    pub(crate) hand_body: usize,
+    pub(crate) bodies: Vec<usize>,
+    pub(crate) max_torque: JointVector,
+}
+
+/// A compiled scene; shared by all trials that run on it.
+#[derive(Debug)]
+pub struct Scene {
+    /// The arms, by [`ArmId`].
+    pub robots: Vec<RobotModel>,
+    /// Where they stand.
+    pub world_from_bases: Vec<Pose>,
+    /// The object.
+    pub object: ArticulatedObject,
+    /// Its graph.
+    pub graph: ObjectGraph,
+    /// The dependency root of its motions.
+    pub root: PartId,
+    /// The model as MJCF.
+    pub mjcf: String,
+    /// Simulated time per step (s).
+    pub timestep: f64,
+    pub(crate) model: Arc<MjModel>,
+    pub(crate) arms: Vec<ArmIndex>,
+    pub(crate) part_bodies: Vec<usize>,
+    pub(crate) object_qpos: usize,
+    pub(crate) object_dof: usize,
+    /// (qpos address, dof address) of each object joint; none for fixed joints.
+    pub(crate) joint_addresses: Vec<Option<(usize, usize)>>,
+    pub(crate) owners: Vec<Owner>,
+}
+
+impl Scene {
+    /// Compiles the scene. Fails if the simulator refuses the model.
+    pub fn new(config: &SceneConfig, robots: Vec<RobotModel>, object: ArticulatedObject) -> Result<Self, Error> {
+        let graph = ObjectGraph::of(&object).map_err(|cause| Error::Object { name: object.name.clone(), cause })?;
+        if robots.len() != object.parts.len() {
+            return Err(Error::ArmCount { arms: robots.len(), parts: object.parts.len(), object: object.name });
+        }
+        let world_from_bases = base_poses(config, robots.len());
+        let mjcf = mjcf::scene(config, &robots, &world_from_bases, &object);
+        let model = MjModel::from_xml_string(&mjcf).map_err(|cause| Error::Model { cause: cause.to_string() })?;
+        let arms = robots.iter().enumerate().map(|(arm, robot)| arm_index(&model, arm, robot)).collect::<Result<Vec<_>, _>>()?;
+        let part_bodies = object
+            .parts
+            .iter()
+            .map(|part| id(&model, MjtObjBase::mjOBJ_BODY, &mjcf::part_name(&part.name)))
+            .collect::<Result<Vec<_>, _>>()?;
+        let (object_qpos, object_dof) = addresses(&model, "object")?;
+        let joint_addresses = object
+            .joints
+            .iter()
+            .map(|joint| match joint.kind {
+                vmao_core::object::JointKind::Fixed => Ok(None),
+                _ => addresses(&model, &mjcf::part_name(&joint.name)).map(Some),
+            })
+            .collect::<Result<Vec<_>, _>>()?;
+        let owners = owners(&model, &arms, &part_bodies)?;
+        Ok(Self {
+            robots,
+            world_from_bases,
+            object,
+            graph,
+            root: PartId(0),
+            mjcf,
+            timestep: config.timestep,
+            model: Arc::new(model),
+            arms,
+            part_bodies,
+            object_qpos,
+            object_dof,
+            joint_addresses,
+            owners,
+        })
+    }
+}
+
+/// Base poses of `count` arms; all face the table's centre.
+fn base_poses(config: &SceneConfig, count: usize) -> Vec<Pose> {
+    let Layout::Opposed = config.layout;
+    let sides = [count.div_ceil(2), count / 2];
+    (0..count)
+        .map(|arm| {
+            let (side, place) = (arm % 2, arm / 2);
+            let across = (place as f64 - (sides[side] as f64 - 1.0) / 2.0) * config.base_spacing;
+            let turn = if side == 0 { 0.0 } else { std::f64::consts::PI };
+            let x = if side == 0 { -config.base_distance } else { config.base_distance };
+            Pose::new(nalgebra::Vector3::new(x, across, 0.0), nalgebra::Vector3::z() * turn)
+        })
+        .collect()
+}
+
+fn id(model: &MjModel, kind: MjtObjBase, name: &str) -> Result<usize, Error> {
+    model.name_to_id(kind, name).ok_or_else(|| Error::Model { cause: format!("the compiled model has no `{name}`") })
+}
+
+fn addresses(model: &MjModel, joint: &str) -> Result<(usize, usize), Error> {
+    let joint = id(model, MjtObjBase::mjOBJ_JOINT, joint)?;
+    Ok((model.jnt_qposadr()[joint] as usize, model.jnt_dofadr()[joint] as usize))
+}
+
+fn arm_index(model: &MjModel, arm: usize, robot: &RobotModel) -> Result<ArmIndex, Error> {
+    let joint_name = |index: usize| mjcf::arm_name(arm, &format!("joint{}", index + 1));
+    if robot.joints.len() != JOINTS {
+        return Err(Error::Model {
+            cause: format!("robot `{}` has {} joints; arms have {JOINTS}", robot.name, robot.joints.len()),
+        });
+    }
+    let joints =
+        (0..JOINTS).map(|index| id(model, MjtObjBase::mjOBJ_JOINT, &joint_name(index))).collect::<Result<Vec<_>, _>>()?;
+    let (qpos, dof) = addresses(model, &joint_name(0))?;
+    let (finger_qpos, finger_dof) = addresses(model, &mjcf::arm_name(arm, "finger1"))?;
+    let gripper = &robot.gripper;
+    let mut names = vec![robot.base.name];
+    names.extend(robot.joints.iter().map(|joint| joint.link.name));
+    names.push(gripper.hand.name);
+    names.extend(gripper.fingers.iter().map(|finger| finger.link.name));
+    let bodies =
+        names.iter().map(|name| id(model, MjtObjBase::mjOBJ_BODY, &mjcf::arm_name(arm, name))).collect::<Result<Vec<_>, _>>()?;
+    Ok(ArmIndex {
+        joints,
+        qpos,
+        dof,
+        ctrl: id(model, MjtObjBase::mjOBJ_ACTUATOR, &joint_name(0))?,
+        finger_qpos,
+        finger_dof,
+        hand_body: id(model, MjtObjBase::mjOBJ_BODY, &mjcf::arm_name(arm, gripper.hand.name))?,
+        bodies,
+        max_torque: JointVector::from_iterator(robot.joints.iter().map(|joint| joint.max_torque)),
+    })
+}
+
+fn owners(model: &MjModel, arms: &[ArmIndex], part_bodies: &[usize]) -> Result<Vec<Owner>, Error> {
+    let mut owners = Vec::new();
+    for (geom, &body) in model.geom_bodyid().iter().enumerate() {
+        let body = body as usize;
+        let arm = arms.iter().position(|arm| arm.bodies.contains(&body));
+        let part = part_bodies.iter().position(|&part| part == body);
+        owners.push(match (arm, part) {
+            (Some(arm), _) => {
+                let pad = |finger: usize| model.name_to_id(MjtObjBase::mjOBJ_GEOM, &mjcf::arm_name(arm, &format!("pad{finger}")));
+                match (1..=2).find(|&finger| pad(finger) == Some(geom)) {
+                    Some(finger) => Owner::Pad(ArmId(arm as u16), finger - 1),
+                    None => Owner::Link(ArmId(arm as u16)),
+                }
+            }
+            (None, Some(part)) => Owner::Part(PartId(part as u16)),
+            (None, None) => Owner::Table,
+        });
+    }
+    Ok(owners)
+}
