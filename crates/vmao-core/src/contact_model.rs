@@ -30,7 +30,7 @@ pub trait ContactModel: Sync {
 pub struct JitteredTuple {
     /// The tuple drawn from the successes so far.
     pub tuple: ContactTuple,
-    /// Neighbourhood radius r (m); the cloud's nearest point is taken if it holds none.
+    /// Neighbourhood radius r (m).
     pub radius: f64,
 }
 
@@ -46,7 +46,7 @@ impl ContactModel for JitteredTuple {
     }
 }
 
-/// A uniformly drawn point of `part` within `radius` of `center`.
+/// A uniformly drawn point of `part` within `radius` of `center`; where that is hidden, the nearest within twice as far.
 fn neighbour(
     observation: &Observation,
     part: PartId,
@@ -54,15 +54,20 @@ fn neighbour(
     radius: f64,
     stream: &mut Stream,
 ) -> Option<Point3<f64>> {
-    let near: Vec<Point3<f64>> = observation
+    let seen: Vec<(f64, Point3<f64>)> = observation
         .points
         .iter()
         .zip(&observation.labels)
         .filter(|(_, label)| **label == PointLabel::Part(part.0))
         .map(|(point, _)| Point3::from(point.map(f64::from)))
-        .filter(|point| (point - center).norm() < radius)
+        .map(|point| ((point - center).norm(), point))
+        .filter(|(distance, _)| *distance < 2.0 * radius)
         .collect();
-    if near.is_empty() { None } else { Some(near[stream.index(near.len())]) }
+    let near: Vec<Point3<f64>> = seen.iter().filter(|(distance, _)| *distance < radius).map(|(_, point)| *point).collect();
+    if near.is_empty() {
+        return seen.into_iter().min_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, point)| point);
+    }
+    Some(near[stream.index(near.len())])
 }
 
 /// A tuple used as it is: demonstrations, and recorded trials run again.

@@ -1,7 +1,7 @@
 //! From two contact points to gripper poses: the closing axis is given, the approach about it is free.
 
 use crate::geometry::Pose;
-use nalgebra::{Point3, Rotation3, Translation3, Unit, UnitQuaternion, Vector3};
+use nalgebra::{Matrix3, Point3, Rotation3, Translation3, Unit, UnitQuaternion, Vector3};
 
 /// A way to bring the gripper to two contact points.
 #[derive(Debug, Clone, PartialEq)]
@@ -54,6 +54,52 @@ pub fn gripper_poses(fingers: &[Point3<f64>; 2], count: usize) -> Vec<GripperPos
     poses
 }
 
+/// The same contacts with the closing axis turned square to the bar they lie on, and level where it is nearly so.
+///
+/// The bar's direction is the principal axis of the cloud `points` around the contacts' middle. Pads that close askew
+/// turn the part or the hand until they lie flat; planning for the square grasp foresees it. `None` where the points
+/// nearby are not drawn out like a bar, or the axis would have to turn by more than `limit` (rad).
+pub fn squared(fingers: &[Point3<f64>; 2], points: &[Point3<f64>], limit: f64) -> Option<[Point3<f64>; 2]> {
+    let middle = nalgebra::center(&fingers[0], &fingers[1]);
+    let near: Vec<Vector3<f64>> =
+        points.iter().map(|point| point - middle).filter(|offset| offset.norm() < BAR_NEIGHBOURHOOD).collect();
+    if near.len() < FEWEST_BAR_POINTS {
+        return None;
+    }
+    let mean: Vector3<f64> = near.iter().sum::<Vector3<f64>>() / near.len() as f64;
+    let covariance: Matrix3<f64> = near.iter().map(|offset| (offset - mean) * (offset - mean).transpose()).sum();
+    let eigen = covariance.symmetric_eigen();
+    let longest = eigen.eigenvalues.imax();
+    let second = (0..3).filter(|&i| i != longest).map(|i| eigen.eigenvalues[i]).fold(0.0, f64::max);
+    if eigen.eigenvalues[longest] < BAR_ELONGATION * second {
+        return None;
+    }
+    let bar = eigen.eigenvectors.column(longest).into_owned();
+    let along = fingers[0] - fingers[1];
+    let mut square = along - bar * bar.dot(&along);
+    let tilt = square.z.abs().atan2(square.xy().norm());
+    // Level first, then square again within the level plane, unless the bar itself stands upright.
+    if tilt < limit {
+        let across = bar.cross(&Vector3::z());
+        if across.norm() > 0.3 {
+            square = across * across.dot(&along);
+        }
+    }
+    let direction = square.try_normalize(1e-6)?;
+    if direction.dot(&along) < along.norm() * limit.cos() {
+        return None;
+    }
+    let half = direction * (along.norm() / 2.0);
+    Some([middle + half, middle - half])
+}
+
+/// Cloud points within this distance of the contacts' middle show the bar's direction (m) ...
+const BAR_NEIGHBOURHOOD: f64 = 0.028;
+/// ... if there are at least so many ...
+const FEWEST_BAR_POINTS: usize = 12;
+/// ... and their longest variance is this many times the next.
+const BAR_ELONGATION: f64 = 2.0;
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -91,5 +137,31 @@ mod tests {
     #[test]
     fn coinciding_points_give_no_pose() {
         assert!(gripper_poses(&[Point3::origin(), Point3::origin()], 8).is_empty());
+    }
+
+    #[test]
+    fn askew_contacts_on_a_bar_are_squared_and_a_ball_is_left_alone() {
+        let heading = 0.7_f64;
+        let turn = Rotation3::from_axis_angle(&Vector3::z_axis(), heading);
+        let mut bar = Vec::new();
+        for step in -30..=30 {
+            for side in [-0.008, 0.008] {
+                for height in [0.002, 0.01, 0.018] {
+                    bar.push(turn * Point3::new(f64::from(step) * 0.002, side, height));
+                }
+            }
+        }
+        let askew = [turn * Point3::new(0.005, 0.008, 0.013), turn * Point3::new(-0.005, -0.008, 0.007)];
+        let square = squared(&askew, &bar, 0.9).unwrap();
+        let axis = turn.inverse() * (square[0] - square[1]).normalize();
+        assert!((axis - Vector3::y()).norm() < 0.02, "{axis:?}");
+        let middle = nalgebra::center(&square[0], &square[1]);
+        assert!((middle - nalgebra::center(&askew[0], &askew[1])).norm() < 1e-12);
+        let mut stream = crate::random::Stream::new(1, &[]);
+        let ball: Vec<Point3<f64>> = (0..400)
+            .filter_map(|_| Vector3::new(stream.normal(), stream.normal(), stream.normal()).try_normalize(1e-6))
+            .map(|direction| Point3::from(direction * 0.012))
+            .collect();
+        assert_eq!(squared(&[Point3::new(0.0, 0.012, 0.0), Point3::new(0.0, -0.012, 0.0)], &ball, 0.9), None);
     }
 }

@@ -6,7 +6,7 @@ use crate::grasping::{Grasp, MAX_JOINT_STEP, compatible_grasps, ik_settings, joi
 use crate::planning_world::{Obstacles, collision_world};
 use crate::recorder::Recorder;
 use crate::scene::Scene;
-use crate::simulation::{Grip, Simulation};
+use crate::simulation::{Grip, Simulation, part_centers};
 use crate::task::{goal_errors, sample_goal, sample_start, threshold_factor};
 use crate::trial::{Recording, Trial, TrialConfig};
 use nalgebra::Point3;
@@ -189,10 +189,18 @@ impl<'a> Attempt<'a> {
         let poses = self.waypoints(&self.trajectory(goal));
         let mut stream = self.stream(Draw::Reach);
         let mut candidates = Vec::new();
+        let observation = self.grasps[first].observation.clone();
         for (grasp, fingers) in contacts.iter().enumerate() {
             let (arm, part) = (self.arms[first + grasp], PartId((first + grasp) as u16));
             let motion: Vec<Pose> = poses.iter().map(|parts| parts[usize::from(part.0)]).collect();
-            candidates.push(reachable_grasps(&self.simulation, &self.config.grasp, (arm, part), fingers, &motion, &mut stream)?);
+            candidates.push(reachable_grasps(
+                &self.simulation,
+                &self.config.grasp,
+                (arm, part),
+                (&observation, fingers),
+                &motion,
+                &mut stream,
+            )?);
         }
         compatible_grasps(&self.simulation, &self.config.grasp, &candidates, &self.holders())
     }
@@ -216,8 +224,8 @@ impl<'a> Attempt<'a> {
             openings[usize::from(grasp.arm.0)] = grasp.opening;
         }
         let chosen: Vec<&Grasp> = grasps.iter().collect();
-        let start = joint_positions_with(&self.simulation, &[], |grasp| grasp.standoff());
-        let standoff = joint_positions_with(&self.simulation, &chosen, |grasp| grasp.standoff());
+        let start = joint_positions_with(&self.simulation, &[], &|grasp| grasp.standoff().to_vec());
+        let standoff = joint_positions_with(&self.simulation, &chosen, &|grasp| grasp.standoff().to_vec());
         let world = collision_world(&self.simulation, &openings, &Obstacles::Parts(&self.holders()));
         let moving: Vec<usize> = grasps.iter().map(|grasp| usize::from(grasp.arm.0)).collect();
         let frozen_arms = (0..self.scene.robots.len()).filter(|arm| !moving.contains(arm)).collect();
@@ -350,7 +358,7 @@ impl<'a> Attempt<'a> {
                     None => self.simulation.joint_positions(arm).as_slice().to_vec(),
                 })
                 .collect();
-            if let Some(pair) = checker.check(&q, self.config.grasp.table_clearance / 2.0) {
+            if let Some(pair) = checker.check(&q, self.config.grasp.carry_margin / 2.0) {
                 return Err(Failure::new(FailureStage::NoPlan, format!("on the way to the goal {pair}")));
             }
         }
@@ -416,13 +424,8 @@ impl<'a> Attempt<'a> {
 /// The assignment of arms to parts that keeps the arms' bases nearest to their parts; arm i to part i among equals.
 fn nearest_arms(scene: &Scene, start: &ObjectState) -> Vec<ArmId> {
     let count = scene.object.parts.len();
-    let middle = |part: usize| {
-        let solids = &scene.object.parts[part].solids;
-        let volume: f64 = solids.iter().map(|solid| solid.shape.volume()).sum();
-        let weighted = solids.iter().map(|solid| solid.carrier_from_solid.translation.vector * (solid.shape.volume() / volume));
-        start.world_from_parts[part] * Point3::from(weighted.sum::<nalgebra::Vector3<f64>>())
-    };
-    let distance = |arm: usize, part: usize| (middle(part).coords - scene.world_from_bases[arm].translation.vector).xy().norm();
+    let centers = part_centers(scene, start);
+    let distance = |arm: usize, part: usize| (centers[part].coords - scene.world_from_bases[arm].translation.vector).xy().norm();
     let mut best = ((0..count).collect::<Vec<_>>(), f64::INFINITY);
     permutations(count, &mut |order| {
         let total: f64 = order.iter().enumerate().map(|(part, &arm)| distance(arm, part)).sum();

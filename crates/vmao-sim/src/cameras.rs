@@ -21,20 +21,22 @@ pub struct CameraConfig {
     pub field_of_view_deg: f64,
     /// Horizontal distance from the workspace's centre (m).
     pub distance: f64,
-    /// Height above the table (m).
-    pub elevation: f64,
+    /// Heights above the table, taken in turn by the cameras (m).
+    pub elevations: Vec<f64>,
     /// Half the workspace's edge along x and y (m): points outside are dropped.
     pub workspace_half_width: f64,
     /// Height of the workspace (m).
     pub workspace_height: f64,
     /// Points kept of the fused cloud.
     pub points: usize,
-    /// Largest share of the kept points that may lie on the table's plane.
+    /// Largest share of the kept points that may lie on the table's plane, if enough others are seen.
     pub table_share: f64,
+    /// The same for points on the arms: an arm knows where it is, so this needs no labels of the object.
+    pub robot_share: f64,
 }
 
 /// Points up to this height count as the table's plane when the cloud is thinned (m); geometry only, no labels.
-const TABLE_PLANE_HEIGHT: f64 = 0.002;
+pub(crate) const TABLE_PLANE_HEIGHT: f64 = 0.002;
 
 struct Seen {
     position: [f32; 3],
@@ -46,18 +48,20 @@ struct Seen {
 ///
 /// World frame, metres. The sample depends on `stream` and the scene's state only.
 pub(crate) fn observe(simulation: &mut Simulation<'_>, config: &CameraConfig, stream: &mut Stream) -> Observation {
-    let mut table = Vec::new();
-    let mut above = Vec::new();
+    let mut kinds: [Vec<Seen>; 3] = Default::default();
     for camera in 0..config.count {
         for point in picture(simulation, config, camera) {
-            if f64::from(point.position[2]) <= TABLE_PLANE_HEIGHT { table.push(point) } else { above.push(point) }
+            let kind = match point.label {
+                PointLabel::Arm(_) => 1,
+                _ if f64::from(point.position[2]) <= TABLE_PLANE_HEIGHT => 2,
+                _ => 0,
+            };
+            kinds[kind].push(point);
         }
     }
-    let wanted_table = ((config.points as f64 * config.table_share) as usize).min(table.len());
-    let wanted_above = (config.points - wanted_table).min(above.len());
-    let wanted_table = (config.points - wanted_above).min(table.len());
+    let counts = shares(config, kinds.each_ref().map(Vec::len));
     let mut observation = Observation::default();
-    for (points, wanted) in [(&above, wanted_above), (&table, wanted_table)] {
+    for (points, wanted) in kinds.iter().zip(counts) {
         for &index in &stream.permutation(points.len())[..wanted] {
             let seen = &points[index];
             observation.points.push(seen.position);
@@ -68,10 +72,25 @@ pub(crate) fn observe(simulation: &mut Simulation<'_>, config: &CameraConfig, st
     observation
 }
 
+/// How many points to keep of the rest, the arms and the table: their shares, and what is left over wherever there is more.
+fn shares(config: &CameraConfig, seen: [usize; 3]) -> [usize; 3] {
+    let share = |share: f64| (config.points as f64 * share) as usize;
+    let arms = share(config.robot_share).min(seen[1]);
+    let table = share(config.table_share).min(seen[2]);
+    let rest = (config.points - arms - table).min(seen[0]);
+    let table = (config.points - arms - rest).min(seen[2]);
+    let arms = (config.points - table - rest).min(seen[1]);
+    [rest, arms, table]
+}
+
 fn picture(simulation: &mut Simulation<'_>, config: &CameraConfig, camera: usize) -> Vec<Seen> {
     // Off the axes of symmetry, so that no two cameras see the same silhouette of the arms.
     let azimuth = std::f64::consts::TAU * (camera as f64 + 0.5) / config.count as f64;
-    let eye = Vector3::new(config.distance * azimuth.cos(), config.distance * azimuth.sin(), config.elevation);
+    let eye = Vector3::new(
+        config.distance * azimuth.cos(),
+        config.distance * azimuth.sin(),
+        config.elevations[camera % config.elevations.len()],
+    );
     let look = (Vector3::new(0.0, 0.0, 0.05) - eye).normalize();
     let rotation = Rotation3::face_towards(&look, &Vector3::z());
     let scale = (config.field_of_view_deg.to_radians() / 2.0).tan();

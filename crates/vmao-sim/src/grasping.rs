@@ -1,15 +1,17 @@
 //! From contact points to a gripper pose that the arm can reach, hold through the motion, and get to unhindered.
 
+use crate::cameras::TABLE_PLANE_HEIGHT;
 use crate::failure::Failure;
 use crate::planning_world::{Obstacles, collision_world, lowest_gripper_point};
 use crate::simulation::Simulation;
-use nalgebra::Point3;
+use nalgebra::{Point3, Vector3};
 use serde::{Deserialize, Serialize};
 use vmao_core::collision::CollisionChecker;
 use vmao_core::contact::{ArmId, PartId};
 use vmao_core::geometry::{Pose, interpolate};
-use vmao_core::gripper_pose::{GripperPose, gripper_poses};
+use vmao_core::gripper_pose::{GripperPose, gripper_poses, squared};
 use vmao_core::inverse_kinematics::{IkSettings, posture_cost, solve_nearest, track};
+use vmao_core::observation::{Observation, PointLabel};
 use vmao_core::outcome::FailureStage;
 use vmao_core::random::Stream;
 
@@ -29,8 +31,16 @@ pub struct GraspConfig {
     pub max_retreat: f64,
     /// Distance that plans keep from everything (m).
     pub plan_margin: f64,
-    /// Cost of an approach per squared radian from straight down, against the posture's cost.
-    pub tilt_cost: f64,
+    /// Preferred lean of the approach away from the arm's own base, per unit down (–).
+    pub lean_forward: f64,
+    /// Preferred lean towards the object's other parts, so that the hand stays outside, per unit down (–).
+    pub lean_inward: f64,
+    /// Distance that arms keep from each other while they carry the object (m).
+    pub carry_margin: f64,
+    /// Cost of an approach per squared deviation from that direction, against the posture's cost.
+    pub approach_cost: f64,
+    /// The closing axis may be turned by up to this to lie square to the bar that is grasped (degrees).
+    pub squaring_deg: f64,
     /// Gripper poses of each arm that are tried in combination.
     pub shortlist: usize,
     /// Joint solutions compared for each gripper pose.
@@ -55,8 +65,8 @@ pub(crate) struct Grasp {
     pub(crate) opening: f64,
     /// Joint positions from the stand-off to the grasp.
     pub(crate) approach: Vec<Vec<f64>>,
-    /// Joint positions at the end of the motion that follows.
-    pub(crate) carried_to: Vec<f64>,
+    /// Joint positions along the motion that follows.
+    pub(crate) carried: Vec<Vec<f64>>,
     cost: f64,
 }
 
@@ -72,6 +82,8 @@ impl Grasp {
 
 /// Waypoints of the straight approach, and the largest joint step between neighbouring waypoints of a motion (rad).
 const APPROACH_WAYPOINTS: usize = 6;
+/// Free combinations of grasps that are handed to the planner.
+const PLANNED_COMBINATIONS: usize = 3;
 pub(crate) const MAX_JOINT_STEP: f64 = 0.6;
 
 pub(crate) fn ik_settings(restarts: usize) -> IkSettings {
@@ -85,7 +97,7 @@ pub(crate) fn reachable_grasps(
     simulation: &Simulation<'_>,
     config: &GraspConfig,
     (arm, part): (ArmId, PartId),
-    fingers: &[Point3<f64>; 2],
+    (observation, fingers): (&Observation, &[Point3<f64>; 2]),
     part_motion: &[Pose],
     stream: &mut Stream,
 ) -> Result<Vec<Grasp>, Failure> {
@@ -100,7 +112,9 @@ pub(crate) fn reachable_grasps(
         ));
     }
     let opening = (width + config.opening_margin).min(robot.gripper.max_opening());
-    let poses = gripper_poses(fingers, config.approaches);
+    let cloud = object_cloud(observation);
+    let squared = squared(fingers, &cloud, config.squaring_deg.to_radians());
+    let poses = gripper_poses(squared.as_ref().unwrap_or(fingers), config.approaches);
     if poses.is_empty() {
         return Err(Failure::new(FailureStage::Unreachable, "both fingers on one point"));
     }
@@ -109,7 +123,7 @@ pub(crate) fn reachable_grasps(
     for pose in poses {
         let lowest = lowest_gripper_point(robot, &pose.world_from_tool, opening);
         let missing = config.table_clearance - lowest;
-        let rise = -(pose.world_from_tool.rotation * nalgebra::Vector3::z()).z;
+        let rise = -(pose.world_from_tool.rotation * Vector3::z()).z;
         // Raised back along the approach until the fingertips clear the table.
         let retreat = if missing <= 0.0 { 0.0 } else { missing / rise.max(1e-3) };
         if retreat > config.max_retreat {
@@ -133,6 +147,15 @@ pub(crate) fn reachable_grasps(
     }
     found.sort_by(|a, b| a.cost.total_cmp(&b.cost));
     Ok(found)
+}
+
+/// Points that lie neither on an arm, which knows where it is, nor on the table's plane.
+fn object_cloud(observation: &Observation) -> Vec<Point3<f64>> {
+    let seen = observation.points.iter().zip(&observation.labels);
+    seen.filter(|(_, label)| !matches!(label, PointLabel::Arm(_)))
+        .map(|(point, _)| Point3::from(point.map(f64::from)))
+        .filter(|point| point.z > TABLE_PLANE_HEIGHT)
+        .collect()
 }
 
 fn carried_grasp(
@@ -161,62 +184,68 @@ fn carried_grasp(
     let carried: Vec<Pose> =
         part_motion[1..].iter().map(|world_from_part| base_from_world * world_from_part * part_from_tool).collect();
     let motion = track(chain, &carried, approach.last()?, MAX_JOINT_STEP, &settings).ok()?;
-    let carried_to = motion.last().or(approach.last())?.clone();
     let home = &simulation.scene.robots[index].home;
-    let cost = config.tilt_cost * pose.approach_angle.powi(2)
+    let preferred = preferred_approach(simulation, config, (index, part), &pose.world_from_tool);
+    let cost = config.approach_cost * (pose.world_from_tool.rotation * Vector3::z() - preferred).norm_squared()
         + posture_cost(chain, start, now.as_slice())
-        + posture_cost(chain, &carried_to, home);
-    Some(Grasp { arm, part, world_from_tool: pose.world_from_tool, opening, approach, carried_to, cost })
+        + posture_cost(chain, motion.last()?, home);
+    Some(Grasp { arm, part, world_from_tool: pose.world_from_tool, opening, approach, carried: motion, cost })
 }
 
-/// One grasp for each arm such that no two arms, parts or the table meet at stand-off, grasp and the motion's end.
+/// The approach that leaves the other arms most room: down, leaning in from the arm's own side and from outside the object.
+fn preferred_approach(
+    simulation: &Simulation<'_>,
+    config: &GraspConfig,
+    (arm, part): (usize, PartId),
+    world_from_tool: &Pose,
+) -> Vector3<f64> {
+    let level = |v: Vector3<f64>| Vector3::new(v.x, v.y, 0.0).try_normalize(1e-9).unwrap_or_else(Vector3::zeros);
+    let here = world_from_tool.translation.vector;
+    let forward = level(here - simulation.scene.world_from_bases[arm].translation.vector);
+    let others = simulation.part_centers().into_iter().enumerate().filter(|(other, _)| *other != usize::from(part.0));
+    let inward: Vector3<f64> = others.map(|(_, center)| level(center.coords - here)).sum();
+    (forward * config.lean_forward + level(inward) * config.lean_inward - Vector3::z()).normalize()
+}
+
+/// Choices of one grasp for each arm such that nothing meets at the stand-offs, at the grasps or along the motion.
 ///
-/// Combinations are tried by total cost; the first ones that are free are returned, best first, for the planner.
+/// Combinations are tried by total cost; the first few that are free are returned, best first, for the planner.
 pub(crate) fn compatible_grasps(
     simulation: &Simulation<'_>,
     config: &GraspConfig,
     candidates: &[Vec<Grasp>],
     holders: &[(usize, usize)],
 ) -> Result<Vec<Vec<Grasp>>, Failure> {
-    let mut combinations: Vec<(f64, Vec<usize>)> = vec![(0.0, Vec::new())];
-    for grasps in candidates {
-        let extend = |(cost, chosen): &(f64, Vec<usize>)| {
-            let (cost, chosen) = (*cost, chosen.clone());
-            (0..grasps.len().min(config.shortlist)).map(move |next| {
-                let mut longer = chosen.clone();
-                longer.push(next);
-                (cost + grasps[next].cost, longer)
-            })
-        };
-        combinations = combinations.iter().flat_map(extend).collect();
-        combinations.sort_by(|a, b| a.0.total_cmp(&b.0));
-        combinations.truncate(config.shortlist * config.shortlist);
-    }
     let mut openings: Vec<f64> = (0..simulation.scene.robots.len()).map(|arm| simulation.opening(arm)).collect();
     for grasps in candidates {
         openings[usize::from(grasps[0].arm.0)] = grasps.iter().map(|grasp| grasp.opening).fold(0.0, f64::max);
     }
-    let grasped: Vec<(usize, usize)> = candidates.iter().map(|g| (usize::from(g[0].arm.0), usize::from(g[0].part.0))).collect();
-    let touching: Vec<(usize, usize)> = holders.iter().chain(&grasped).copied().collect();
-    let at_standoff = collision_world(simulation, &openings, &Obstacles::Parts(holders));
-    let at_grasp = collision_world(simulation, &openings, &Obstacles::Parts(&touching));
-    let at_goal = collision_world(simulation, &openings, &Obstacles::Nothing);
-    let mut checkers = [CollisionChecker::new(&at_standoff), CollisionChecker::new(&at_grasp), CollisionChecker::new(&at_goal)];
+    let grasped = candidates.iter().map(|grasps| (usize::from(grasps[0].arm.0), usize::from(grasps[0].part.0)));
+    let touching: Vec<(usize, usize)> = holders.iter().copied().chain(grasped).collect();
+    let worlds = [
+        collision_world(simulation, &openings, &Obstacles::Parts(holders)),
+        collision_world(simulation, &openings, &Obstacles::Parts(&touching)),
+        collision_world(simulation, &openings, &Obstacles::Nothing),
+    ];
+    let [mut standoff, mut grasp, mut carry] = worlds.each_ref().map(CollisionChecker::new);
     let mut blocked = String::new();
     let mut free = Vec::new();
-    for (_, combination) in combinations {
-        let chosen: Vec<&Grasp> = combination.iter().zip(candidates).map(|(&i, grasps)| &grasps[i]).collect();
-        let phases: [fn(&Grasp) -> &[f64]; 3] = [|g| g.standoff(), |g| g.grasp(), |g| &g.carried_to];
-        let margins = [config.plan_margin, config.table_clearance / 2.0, config.plan_margin];
-        let hit = (0..3).find_map(|phase| {
-            let q = joint_positions_with(simulation, &chosen, phases[phase]);
-            checkers[phase].check(&q, margins[phase])
-        });
+    for combination in cheapest_combinations(candidates, config.shortlist) {
+        let chosen: Vec<&Grasp> = combination.iter().zip(candidates).map(|(&index, grasps)| &grasps[index]).collect();
+        let with = |phase: &dyn Fn(&Grasp) -> Vec<f64>| joint_positions_with(simulation, &chosen, phase);
+        let at_standoff = standoff.check(&with(&|grasp| grasp.standoff().to_vec()), config.plan_margin);
+        let mut at_grasp = || grasp.check(&with(&|grasp| grasp.grasp().to_vec()), config.table_clearance / 2.0);
+        let mut waypoints = (0..chosen[0].carried.len()).rev();
+        let mut carried = || waypoints.find_map(|i| carry.check(&with(&|grasp| grasp.carried[i].clone()), config.carry_margin));
+        let hit = at_standoff
+            .map(|pair| ("before the grasp", pair))
+            .or_else(|| at_grasp().map(|pair| ("at the grasp", pair)))
+            .or_else(|| carried().map(|pair| ("on the way to the goal", pair)));
         match hit {
             None => free.push(chosen.into_iter().cloned().collect()),
-            Some(pair) => blocked = pair.to_string(),
+            Some((when, pair)) => blocked = format!("{when} {pair}"),
         }
-        if free.len() >= 3 {
+        if free.len() >= PLANNED_COMBINATIONS {
             break;
         }
     }
@@ -226,11 +255,33 @@ pub(crate) fn compatible_grasps(
     Ok(free)
 }
 
+/// Indices of one candidate for each arm, in the order of their total cost, over each arm's `shortlist` cheapest.
+fn cheapest_combinations(candidates: &[Vec<Grasp>], shortlist: usize) -> Vec<Vec<usize>> {
+    let mut combinations: Vec<(f64, Vec<usize>)> = vec![(0.0, Vec::new())];
+    for grasps in candidates {
+        let mut longer = Vec::new();
+        for (cost, chosen) in &combinations {
+            for (next, grasp) in grasps.iter().enumerate().take(shortlist) {
+                longer.push((cost + grasp.cost, chosen.iter().copied().chain([next]).collect()));
+            }
+        }
+        longer.sort_by(|a, b| a.0.total_cmp(&b.0));
+        // With many arms only the cheapest partial choices are extended further.
+        longer.truncate(shortlist * shortlist);
+        combinations = longer;
+    }
+    combinations.into_iter().map(|(_, chosen)| chosen).collect()
+}
+
 /// Joint positions of all arms (flat), those of the grasping arms taken by `phase`, the others as they are now.
-pub(crate) fn joint_positions_with(simulation: &Simulation<'_>, grasps: &[&Grasp], phase: fn(&Grasp) -> &[f64]) -> Vec<f64> {
+pub(crate) fn joint_positions_with(
+    simulation: &Simulation<'_>,
+    grasps: &[&Grasp],
+    phase: &dyn Fn(&Grasp) -> Vec<f64>,
+) -> Vec<f64> {
     let arms = 0..simulation.scene.robots.len();
     arms.flat_map(|arm| match grasps.iter().find(|grasp| usize::from(grasp.arm.0) == arm) {
-        Some(grasp) => phase(grasp).to_vec(),
+        Some(grasp) => phase(grasp),
         None => simulation.joint_positions(arm).as_slice().to_vec(),
     })
     .collect()

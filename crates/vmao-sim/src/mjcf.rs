@@ -117,7 +117,7 @@ fn finger_body(xml: &mut String, config: &SceneConfig, arm: usize, index: usize,
     line(
         xml,
         &format!(
-            r#"<joint name="{}" type="slide" axis="0 1 0" range="0 {travel}" damping="300" armature="0.05"/>"#,
+            r#"<joint name="{}" type="slide" axis="0 1 0" range="0 {travel}" damping="300" armature="0.05" solreflimit="0.004 1"/>"#,
             arm_name(arm, &format!("finger{}", index + 1))
         ),
     );

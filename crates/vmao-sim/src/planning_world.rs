@@ -11,7 +11,7 @@ use vmao_core::shape::Solid;
 pub(crate) enum Obstacles<'a> {
     /// Every part, where it is now. Arms may touch the parts that they hold or are about to hold: (arm, part).
     Parts(&'a [(usize, usize)]),
-    /// None: the object moves with the arms.
+    /// Only the arms themselves: the object moves with them, away from the table.
     Nothing,
 }
 
@@ -19,8 +19,9 @@ pub(crate) enum Obstacles<'a> {
 pub(crate) fn collision_world(simulation: &Simulation<'_>, openings: &[f64], obstacles: &Obstacles<'_>) -> CollisionWorld {
     let scene = simulation.scene;
     let arms = (0..scene.robots.len()).map(|arm| arm_model(scene, arm, openings[arm])).collect();
-    let mut world = CollisionWorld { arms, floor_height: Some(0.0), ..CollisionWorld::default() };
+    let mut world = CollisionWorld { arms, ..CollisionWorld::default() };
     if let Obstacles::Parts(holders) = obstacles {
+        world.floor_height = Some(0.0);
         let state = simulation.object_state();
         for (part, (description, world_from_part)) in scene.object.parts.iter().zip(&state.world_from_parts).enumerate() {
             for solid in &description.solids {

@@ -15,7 +15,7 @@ use nalgebra::{Point3, Translation3, UnitQuaternion, Vector3};
 use std::f64::consts::PI;
 
 /// Spread of the handles at joint position zero, and how far they open further (rad).
-const SMALLEST_SPREAD: f64 = 50.0 * PI / 180.0;
+const SMALLEST_SPREAD: f64 = 60.0 * PI / 180.0;
 const OPENING: f64 = 60.0 * PI / 180.0;
 /// Jaws stand this far off the +x axis at joint position zero (rad).
 const JAW_ANGLE: f64 = 6.0 * PI / 180.0;
@@ -71,27 +71,12 @@ pub(super) fn item(set: InstanceSet, instance: u16) -> CatalogueItem {
             friction: 0.03,
         }],
     };
-    let demonstrations = [
-        (0.50, Pinch::Sides, 0.85, Pinch::Sides),
-        (0.85, Pinch::Sides, 0.50, Pinch::Sides),
-        (0.65, Pinch::Sides, 0.75, Pinch::Sides),
-        (0.85, Pinch::Sides, 0.85, Pinch::Sides),
-        (0.70, Pinch::Sides, 0.85, Pinch::Faces),
-        (0.85, Pinch::Sides, 0.70, Pinch::Faces),
-    ]
-    .into_iter()
-    .map(|(a, pinch_a, b, pinch_b)| vec![hold(&size, 0, a, pinch_a), hold(&size, 1, b, pinch_b)])
-    .collect();
+    let demonstrations =
+        [(0.50, 0.85), (0.85, 0.50), (0.65, 0.75), (0.85, 0.85), (0.55, 0.60), (0.75, 0.65), (0.90, 0.70), (0.70, 0.90)]
+            .into_iter()
+            .map(|(a, b)| vec![hold(&size, 0, a), hold(&size, 1, b)])
+            .collect();
     CatalogueItem { object, demonstrations }
-}
-
-/// The two pairs of opposite surfaces of a handle.
-#[derive(Clone, Copy)]
-enum Pinch {
-    /// Across its width: possible while it lies on a table.
-    Sides,
-    /// Across its thickness: possible once it is lifted.
-    Faces,
 }
 
 /// Direction of a lever's handle at joint position zero, from the pivot. `side` is +1 for lever a, -1 for lever b.
@@ -123,16 +108,12 @@ fn turned(angle: f64) -> Pose {
     Pose::from_parts(Translation3::identity(), UnitQuaternion::from_axis_angle(&Vector3::z_axis(), angle))
 }
 
-/// A contact across the handle of part 0 or 1, a `fraction` of the way along it. Finger 1 is on the outer side, or on top.
-fn hold(size: &Size, part: u16, fraction: f64, pinch: Pinch) -> Contact {
+/// A contact across the width of the handle of part 0 or 1, a `fraction` of the way along it. Finger 1 is on the outer side.
+fn hold(size: &Size, part: u16, fraction: f64) -> Contact {
     let side = if part == 0 { 1.0 } else { -1.0 };
     let along = fraction * size.handle_length;
-    let offset = match pinch {
-        // The outer side of lever a's handle, seen along the handle from the pivot, is to the right: -y.
-        Pinch::Sides => Vector3::new(0.0, -side * size.handle_width / 2.0, 0.0),
-        Pinch::Faces => Vector3::new(0.0, 0.0, size.thickness / 2.0),
-    };
-    let at = |sign: f64| turned(handle_angle(side)) * (Point3::new(along, 0.0, 0.0) + offset * sign);
+    // The outer side of lever a's handle, seen along the handle from the pivot, is to the right: -y.
+    let at = |across: f64| turned(handle_angle(side)) * Point3::new(along, -across * side * size.handle_width / 2.0, 0.0);
     Contact { part: PartId(part), fingers: [at(1.0), at(-1.0)] }
 }
 
@@ -148,7 +129,7 @@ mod tests {
                 for (index, contact) in tuple.iter().enumerate() {
                     assert_eq!(usize::from(contact.part.0), index);
                     let width = contact.width();
-                    assert!((width - size.handle_width).abs() < 1e-12 || (width - size.thickness).abs() < 1e-12);
+                    assert!((width - size.handle_width).abs() < 1e-12);
                     let middle = nalgebra::center(&contact.fingers[0], &contact.fingers[1]);
                     let angle = middle.y.atan2(middle.x).rem_euclid(2.0 * PI);
                     let side = if index == 0 { 1.0 } else { -1.0 };
@@ -167,10 +148,10 @@ mod tests {
 
     #[test]
     fn finger_one_is_on_the_outer_side() {
-        let contact = hold(&size(InstanceSet::Train, 0), 0, 0.8, Pinch::Sides);
+        let contact = hold(&size(InstanceSet::Train, 0), 0, 0.8);
         // Lever a's handle points to -x, +y; outward is +y of the bisector -x.
         assert!(contact.fingers[0].y > contact.fingers[1].y);
-        let mirrored = hold(&size(InstanceSet::Train, 0), 1, 0.8, Pinch::Sides);
+        let mirrored = hold(&size(InstanceSet::Train, 0), 1, 0.8);
         assert!(mirrored.fingers[0].y < mirrored.fingers[1].y);
     }
 }
