@@ -234,8 +234,8 @@ impl<'a> CollisionChecker<'a> {
         let (mut slot, mut used) = (0, 0);
         for (index, arm) in self.world.arms.iter().enumerate() {
             let own = &q[used..used + arm.chain.len()];
-            let moved = own != &self.posed[used..used + arm.chain.len()];
-            used += arm.chain.len();
+            let moved = own.is_empty() || own != &self.posed[used..used + own.len()];
+            used += own.len();
             let links = if moved { world_from_links(arm, own) } else { Vec::new() };
             while let Some((collider, convex)) = self.local.get(slot) {
                 let link = match *collider {

@@ -6,9 +6,11 @@
 
 pub mod collision;
 pub mod contact;
+mod damped_least_squares;
 pub mod distance;
 pub mod geometry;
 pub mod inverse_kinematics;
+mod joint_path;
 pub mod kinematics;
 pub mod object;
 pub mod observation;

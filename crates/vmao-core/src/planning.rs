@@ -5,6 +5,7 @@
 
 use crate::{
     collision::{CollisionChecker, CollisionPair, CollisionWorld},
+    joint_path::{Tree, at_length, blend, distance, largest_turn, length, remove_collinear},
     random::Stream,
     time_parameterization::{MotionLimits, Trajectory},
 };
@@ -181,7 +182,7 @@ impl<'a> Planner<'a> {
                 }
             }
             // the smaller tree grows next, so that neither side stays a stub
-            side = usize::from(trees[1].parents.len() < trees[0].parents.len());
+            side = usize::from(trees[1].len() < trees[0].len());
         }
         None
     }
@@ -263,51 +264,6 @@ impl<'a> Planner<'a> {
     }
 }
 
-/// Nodes of one search tree, root first.
-struct Tree {
-    width: usize,
-    points: Vec<f64>,
-    parents: Vec<usize>,
-}
-
-impl Tree {
-    fn new(root: &[f64]) -> Self {
-        Self { width: root.len(), points: root.to_vec(), parents: vec![0] }
-    }
-
-    fn point(&self, node: usize) -> &[f64] {
-        &self.points[node * self.width..(node + 1) * self.width]
-    }
-
-    fn push(&mut self, point: &[f64], parent: usize) -> usize {
-        self.points.extend_from_slice(point);
-        self.parents.push(parent);
-        self.parents.len() - 1
-    }
-
-    fn nearest(&self, target: &[f64]) -> usize {
-        let mut best = (f64::INFINITY, 0);
-        for (node, point) in self.points.chunks_exact(self.width).enumerate() {
-            let square = point.iter().zip(target).map(|(a, b)| (a - b) * (a - b)).sum();
-            if square < best.0 {
-                best = (square, node);
-            }
-        }
-        best.1
-    }
-
-    /// From `node` back to the root.
-    fn path_to(&self, node: usize) -> Vec<Vec<f64>> {
-        let mut path = vec![self.point(node).to_vec()];
-        let mut node = node;
-        while node != 0 {
-            node = self.parents[node];
-            path.push(self.point(node).to_vec());
-        }
-        path
-    }
-}
-
 fn orders(items: &[usize]) -> Vec<Vec<usize>> {
     if items.is_empty() {
         return vec![Vec::new()];
@@ -320,46 +276,4 @@ fn orders(items: &[usize]) -> Vec<Vec<usize>> {
         })
     };
     (0..items.len()).flat_map(led_by).collect()
-}
-
-fn blend(from: &[f64], to: &[f64], fraction: f64) -> Vec<f64> {
-    from.iter().zip(to).map(|(a, b)| a + (b - a) * fraction).collect()
-}
-
-fn largest_turn(a: &[f64], b: &[f64]) -> f64 {
-    a.iter().zip(b).map(|(x, y)| (x - y).abs()).fold(0.0, f64::max)
-}
-
-fn distance(a: &[f64], b: &[f64]) -> f64 {
-    a.iter().zip(b).map(|(x, y)| (x - y) * (x - y)).sum::<f64>().sqrt()
-}
-
-fn length(path: &[Vec<f64>]) -> f64 {
-    path.windows(2).map(|edge| distance(&edge[0], &edge[1])).sum()
-}
-
-/// The edge and the point that lie `along` the path (rad).
-fn at_length(path: &[Vec<f64>], along: f64) -> (usize, Vec<f64>) {
-    let mut left = along;
-    for (index, edge) in path.windows(2).enumerate() {
-        let edge_length = distance(&edge[0], &edge[1]);
-        if left < edge_length {
-            return (index, blend(&edge[0], &edge[1], left / edge_length));
-        }
-        left -= edge_length;
-    }
-    (path.len() - 2, path[path.len() - 1].clone())
-}
-
-/// Drops waypoints that lie on the line between their neighbours.
-fn remove_collinear(path: &mut Vec<Vec<f64>>) {
-    let mut i = 1;
-    while i + 1 < path.len() {
-        let (before, after) = (distance(&path[i - 1], &path[i]), distance(&path[i], &path[i + 1]));
-        if before + after - distance(&path[i - 1], &path[i + 1]) < 1e-12 * (before + after) {
-            path.remove(i);
-        } else {
-            i += 1;
-        }
-    }
 }
