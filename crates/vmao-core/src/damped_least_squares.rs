@@ -44,8 +44,8 @@ pub(crate) struct Attempt {
 }
 
 pub(crate) struct Solver<'a> {
-    chain: &'a SerialChain,
-    settings: &'a IkSettings,
+    pub(crate) chain: &'a SerialChain,
+    pub(crate) settings: &'a IkSettings,
     pub(crate) count: usize,
     /// Fixed transforms before each joint, and after the last: rotation and translation.
     fixed: [(Matrix3<f64>, Vector3<f64>); MAX_JOINTS + 1],
@@ -169,6 +169,7 @@ impl<'a> Solver<'a> {
     /// From a solution, slides along the null space to a solution of lower [`posture_cost`].
     pub(crate) fn settle(&self, goal: &Goal, start: Attempt, seed: &[f64]) -> Attempt {
         const ITERATIONS: usize = 40;
+        const STILL: f64 = 1e-3; // rad
         let mut best = start;
         let mut least = posture_cost(self.chain, &best.q[..self.count], seed);
         let mut q = start.q;
@@ -184,7 +185,12 @@ impl<'a> Solver<'a> {
             }
             // far from the pose the wish only gets in the way
             let calm = if error.norm() < 0.02 { 1.0 } else { 0.0 };
-            q = self.advance(&q, &self.step(&q, &error, &columns, &wish.map(|w| (w * calm).clamp(-0.1, 0.1))));
+            let moved = self.advance(&q, &self.step(&q, &error, &columns, &wish.map(|w| (w * calm).clamp(-0.1, 0.1))));
+            let turn = moved.iter().zip(&q).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+            q = moved;
+            if turn < STILL {
+                break;
+            }
         }
         // the last point slid to is rarely exact: finish it, and keep it if it is better
         let last = self.descend(goal, q);

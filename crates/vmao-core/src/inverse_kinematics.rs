@@ -3,6 +3,7 @@
 use crate::{
     damped_least_squares::{Attempt, Goal, LIMIT_ZONE, Solver},
     geometry::Pose,
+    joint_path::largest_turn,
     kinematics::{ChainJoint, SerialChain},
     random::Stream,
 };
@@ -88,28 +89,58 @@ pub fn solve_nearest(
     stream: &mut Stream,
 ) -> IkOutcome {
     let solver = Solver::new(chain, seed, settings);
+    let (found, closest) = gather(&solver, base_from_tool, seed, candidates, stream);
+    outcome(&found.first().map_or(closest, |&(_, attempt)| attempt), solver.count)
+}
+
+/// Distinct solutions among `candidates` found as by [`solve_nearest`], the nearest first.
+///
+/// An arm reaches a pose in several ways, and the nearest may collide or lead nowhere. Empty if the pose was not reached.
+pub fn solutions(
+    chain: &SerialChain,
+    base_from_tool: &Pose,
+    seed: &[f64],
+    candidates: usize,
+    settings: &IkSettings,
+    stream: &mut Stream,
+) -> Vec<Vec<f64>> {
+    const DISTINCT: f64 = 0.1; // rad, of the most different joint
+    let solver = Solver::new(chain, seed, settings);
+    let mut kept: Vec<Vec<f64>> = Vec::new();
+    for (_, attempt) in gather(&solver, base_from_tool, seed, candidates, stream).0 {
+        let q = &attempt.q[..solver.count];
+        if kept.iter().all(|other| largest_turn(other, q) > DISTINCT) {
+            kept.push(q.to_vec());
+        }
+    }
+    kept
+}
+
+/// Up to `candidates` solutions with their cost, cheapest first, and the nearest miss.
+fn gather(
+    solver: &Solver<'_>,
+    base_from_tool: &Pose,
+    seed: &[f64],
+    candidates: usize,
+    stream: &mut Stream,
+) -> (Vec<(f64, Attempt)>, Attempt) {
     let goal = Goal::new(base_from_tool);
-    let mut best: Option<(f64, Attempt)> = None;
     let mut closest = solver.descend(&goal, solver.joints(seed));
-    let mut found = 0;
-    let mut attempt = closest;
-    for _ in 0..=settings.restarts {
+    let (mut attempt, mut found) = (closest, Vec::new());
+    for _ in 0..=solver.settings.restarts {
         if attempt.solved {
             let settled = solver.settle(&goal, attempt, seed);
-            let cost = posture_cost(chain, &settled.q[..solver.count], seed);
-            if best.is_none_or(|(least, _)| cost < least) {
-                best = Some((cost, settled));
-            }
-            found += 1;
-            if found >= candidates {
+            found.push((posture_cost(solver.chain, &settled.q[..solver.count], seed), settled));
+            if found.len() >= candidates {
                 break;
             }
         } else if attempt.error.norm() < closest.error.norm() {
             closest = attempt;
         }
-        attempt = solver.descend(&goal, solver.joints(&chain.sample(stream)));
+        attempt = solver.descend(&goal, solver.joints(&solver.chain.sample(stream)));
     }
-    outcome(&best.map_or(closest, |(_, attempt)| attempt), solver.count)
+    found.sort_by(|a, b| a.0.total_cmp(&b.0));
+    (found, closest)
 }
 
 /// Joint positions that take the tool through `poses` one after the other from `start`, without a jump.

@@ -135,4 +135,27 @@ proptest! {
         }
         prop_assert!(freed > -0.05 * depth, "some way of about that length leads out, best {freed} of {depth}");
     }
+
+    /// Sizes, places and turns on a lattice: parallel faces, shared edges and exact touching all the time.
+    #[test]
+    fn distances_hold_in_degenerate_positions(
+        kinds in [0_usize..4, 0_usize..4], sizes in [[0_u8..4, 0_u8..4, 0_u8..4], [0_u8..4, 0_u8..4, 0_u8..4]],
+        offset in [-6_i8..7, -6_i8..7, -6_i8..7], turns in [0_u8..4, 0_u8..4], axes in [0_usize..3, 0_usize..3],
+    ) {
+        let solid = |i: usize, place: Pose| {
+            let [x, y, z] = sizes[i].map(|size| 0.1 * f64::from(size));
+            let mut turn = [(f64::from(turns[i]) * std::f64::consts::FRAC_PI_4).cos(), 0.0, 0.0, 0.0];
+            turn[1 + axes[i]] = (f64::from(turns[i]) * std::f64::consts::FRAC_PI_4).sin();
+            let shape = match kinds[i] {
+                0 => Shape::Sphere { radius: x },
+                1 => Shape::Capsule { radius: x, half_length: y },
+                _ => Shape::Box { half_extents: [x, y, z] },
+            };
+            (shape, place * pose([0.0; 3], turn))
+        };
+        let [x, y, z] = offset.map(|step| 0.1 * f64::from(step));
+        let (a, b) = (solid(0, Pose::identity()), solid(1, at(x, y, z)));
+        let (found, slow) = (distance(a, b), slow_distance(&a, &b));
+        prop_assert!((found.max(0.0) - slow).abs() < 1e-6, "{found} against {slow}");
+    }
 }
