@@ -57,7 +57,7 @@ fn main() {
             length +=
                 path.windows(2).map(|e| e[0].iter().zip(&e[1]).map(|(a, b)| (a - b) * (a - b)).sum::<f64>().sqrt()).sum::<f64>();
             let limits = MotionLimits { velocity: vec![2.1; 7 * arms], acceleration: vec![7.0; 7 * arms] };
-            if let Some(trajectory) = time_path(&problem.world, &path, &limits, 0.002) {
+            if let Some(trajectory) = time_path(&problem.world, &path, &limits, &PlanSettings::default()) {
                 timed += 1.0;
                 seconds += trajectory.duration();
             }

@@ -148,8 +148,15 @@ struct Pair {
 }
 
 impl<'a> CollisionChecker<'a> {
-    /// Prepares `world`.
+    /// Prepares `world` with every arm able to move.
     pub fn new(world: &'a CollisionWorld) -> Self {
+        Self::with_frozen(world, &[])
+    }
+
+    /// Prepares `world` with the arms `frozen` at rest: pairs of which neither side can move are not compared.
+    ///
+    /// So arms at rest may stay in the contact they have, such as two grippers on one object.
+    pub fn with_frozen(world: &'a CollisionWorld, frozen: &[usize]) -> Self {
         let mut local = Vec::new();
         for (index, arm) in world.arms.iter().enumerate() {
             for LinkSolid { link, solid } in &arm.solids {
@@ -163,15 +170,20 @@ impl<'a> CollisionChecker<'a> {
         for (index, Obstacle { solid, .. }) in world.obstacles.iter().enumerate() {
             local.push((Collider::Obstacle(index), Convex::new(&solid.shape, &solid.carrier_from_solid)));
         }
+        let moves = |collider: Collider| match collider {
+            Collider::Link { arm, link } => link > 0 && !frozen.contains(&arm),
+            Collider::Held { arm } => !frozen.contains(&arm),
+            Collider::Obstacle(_) | Collider::Floor => false,
+        };
         let mut pairs = Vec::new();
         for i in 0..local.len() {
             for j in i + 1..local.len() {
-                if world.compares(local[i].0, local[j].0) {
+                if world.compares(local[i].0, local[j].0) && (moves(local[i].0) || moves(local[j].0)) {
                     pairs.push(Pair { first: i as u32, second: j as u32, reach: local[i].1.bound() + local[j].1.bound() });
                 }
             }
         }
-        let floors = |collider: Collider| world.floor_height.is_some() && world.compares(collider, Collider::Floor);
+        let floors = |collider| world.floor_height.is_some() && world.compares(collider, Collider::Floor) && moves(collider);
         let over_floor = (0..local.len()).filter(|&i| floors(local[i].0)).map(|i| i as u32).collect();
         let placed = local.iter().map(|&(_, convex)| convex).collect();
         let centers = local.iter().map(|(_, convex)| *convex.center()).collect();

@@ -23,7 +23,7 @@ pub struct PlanSettings {
     pub shortcut_iterations: usize,
     /// Least distance between things that must not touch (m).
     pub margin: f64,
-    /// Arms that stay at their start; they still are in the way.
+    /// Arms that stay at their start; they are in the way of the others, but may keep the contacts they have.
     pub frozen_arms: Vec<usize>,
 }
 
@@ -72,7 +72,7 @@ pub fn plan(world: &CollisionWorld, start: &[f64], goal: &[f64], settings: &Plan
     if let Some(pair) = planner.checker.check(&goal, settings.margin) {
         return PlanOutcome::Failed(PlanFailure::GoalInCollision(pair));
     }
-    let finest = settings.step / 5.0;
+    let finest = settings.step / FINER;
     for step in [settings.step, settings.step / 2.0, finest] {
         planner.step = step;
         let Some(mut path) = planner.find(start, &goal, stream) else { break };
@@ -85,19 +85,45 @@ pub fn plan(world: &CollisionWorld, start: &[f64], goal: &[f64], settings: &Plan
     PlanOutcome::Failed(PlanFailure::BudgetExhausted)
 }
 
-/// Times a path, cutting its corners as widely as stays free of collision by `margin` (m), sampled every 5 ms.
+/// The first edge of `path` that comes closer to a collision than the margin, and what collides there.
+///
+/// For paths made elsewhere, such as tracked lines of the tool; checked at a fifth of `settings.step`, like plans.
+/// Panics if a waypoint has not one angle per joint.
+pub fn first_collision(world: &CollisionWorld, path: &[Vec<f64>], settings: &PlanSettings) -> Option<(usize, CollisionPair)> {
+    let mut checker = CollisionChecker::with_frozen(world, &settings.frozen_arms);
+    if let Some(pair) = path.first().and_then(|start| checker.check(start, settings.margin)) {
+        return Some((0, pair));
+    }
+    path.windows(2).enumerate().find_map(|(edge, ends)| {
+        let count = (largest_turn(&ends[0], &ends[1]) / settings.step * FINER).ceil().max(1.0) as usize;
+        (1..=count).find_map(|i| {
+            let pair = checker.check(&blend(&ends[0], &ends[1], i as f64 / count as f64), settings.margin)?;
+            Some((edge, pair))
+        })
+    })
+}
+
+/// Times a path, cutting its corners as widely as stays free of collision by half the margin, sampled every 5 ms.
 ///
 /// Corners come within 0.2 rad of their waypoint down to 0.001 rad; with `None` even the least cut collides.
-pub fn time_path(world: &CollisionWorld, path: &[Vec<f64>], limits: &MotionLimits, margin: f64) -> Option<Trajectory> {
+pub fn time_path(
+    world: &CollisionWorld,
+    path: &[Vec<f64>],
+    limits: &MotionLimits,
+    settings: &PlanSettings,
+) -> Option<Trajectory> {
     const SAMPLE_PERIOD: f64 = 0.005;
-    let mut checker = CollisionChecker::new(world);
+    let mut checker = CollisionChecker::with_frozen(world, &settings.frozen_arms);
     [0.2, 0.05, 0.01, 0.001].into_iter().find_map(|deviation| {
         let trajectory = Trajectory::new(path, limits, deviation);
         let samples = (trajectory.duration() / SAMPLE_PERIOD).ceil() as usize;
-        let free = (0..=samples).all(|i| checker.is_free(&trajectory.at(i as f64 * SAMPLE_PERIOD).0, margin));
-        free.then_some(trajectory)
+        let mut free = |time: f64| checker.is_free(&trajectory.at(time).0, settings.margin / 2.0);
+        (0..=samples).all(|i| free(i as f64 * SAMPLE_PERIOD)).then_some(trajectory)
     })
 }
+
+/// How many times finer than `PlanSettings::step` a finished path is checked.
+const FINER: f64 = 5.0;
 
 struct Planner<'a> {
     world: &'a CollisionWorld,
@@ -118,7 +144,7 @@ impl<'a> Planner<'a> {
         Self {
             world,
             settings,
-            checker: CollisionChecker::new(world),
+            checker: CollisionChecker::with_frozen(world, &settings.frozen_arms),
             step: settings.step,
             samples_left: settings.max_iterations,
             free: arms().map(|(arm, _)| !settings.frozen_arms.contains(&arm)).collect(),
@@ -240,7 +266,8 @@ impl<'a> Planner<'a> {
             let mut candidate = path[..=first].to_vec();
             candidate.extend(stretch.iter().cloned());
             candidate.extend_from_slice(&path[last + 1..]);
-            if length(&candidate) < total - 1e-9 && self.is_free(&stretch) {
+            let start_is_free = |this: &mut Self| this.checker.is_free(&stretch[0], this.settings.margin);
+            if length(&candidate) < total - 1e-9 && start_is_free(self) && self.is_free(&stretch) {
                 candidate.dedup();
                 *path = candidate;
             }
