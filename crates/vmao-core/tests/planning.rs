@@ -156,6 +156,27 @@ fn what_is_held_collides_with_all_but_the_gripper_that_holds_it() {
 }
 
 #[test]
+fn what_two_arms_hold_can_collide() {
+    let mut world = ring(2);
+    for arm in &mut world.arms {
+        let back = arm.world_from_base.rotation * nalgebra::Vector3::new(-0.15, 0.0, 0.0);
+        arm.world_from_base.translation.vector += back;
+    }
+    let home = [PANDA_HOME, PANDA_HOME].concat();
+    let in_hand = world.arms[0].chain.last_from_tool * translation(0.0, 0.0, 0.1);
+    let bar = |half: f64| {
+        let shape = Shape::Box { half_extents: [half, half, 0.02] };
+        vec![Solid { shape, carrier_from_solid: in_hand, color: [0.5; 3] }]
+    };
+    world.attached = vec![bar(0.1), bar(0.1)];
+    assert_eq!(world.check(&home, 0.0), None, "0.29 m between the tools, 0.1 m to each side");
+    world.attached = vec![bar(0.16), bar(0.16)];
+    let hit = world.check(&home, 0.0).expect("0.16 m to each side");
+    assert_eq!((hit.first, hit.second), (Collider::Held { arm: 0 }, Collider::Held { arm: 1 }));
+    assert!((hit.distance - (2.0 * (0.7 - 0.5545) - 0.32)).abs() < 1e-3, "{hit}");
+}
+
+#[test]
 fn a_free_straight_line_is_the_plan() {
     let world =
         CollisionWorld { arms: vec![panda_model(Pose::identity())], floor_height: Some(0.0), ..CollisionWorld::default() };
