@@ -93,7 +93,8 @@ impl Convex {
         let (generators, count) = self.difference(other);
         let (generators, offset) = (&generators[..count], self.center - other.center);
         let depth = separation(&offset, generators);
-        if depth < 0.0 {
+        // a flat set has no depth, only rounding; whether the origin is inside it is for the distance to say
+        if depth < -1e-12 * (self.bound + other.bound) {
             return depth - radius;
         }
         core_distance(&offset, generators, f64::INFINITY) - radius

@@ -21,6 +21,9 @@ fn distance(a: (Shape, Pose), b: (Shape, Pose)) -> f64 {
     let there = a.signed_distance(&b);
     assert!((there - b.signed_distance(&a)).abs() < 1e-9, "the same both ways");
     for margin in [-0.05, 0.0, 0.01, 0.3, there - 1e-6, there + 1e-6] {
+        if (margin - there).abs() < 1e-9 {
+            continue; // rounding decides
+        }
         assert_eq!(a.closer_than(&b, margin), there < margin, "margin {margin}, distance {there}");
     }
     there
