@@ -29,6 +29,7 @@ fn main() {
     }
     let count = std::env::args().nth(1).and_then(|n| n.parse().ok()).unwrap_or(50_u64);
     for (arms, shelf) in [(1, false), (2, false), (3, false), (1, true), (2, true), (3, true)] {
+        let mut timing = 0.0;
         let (mut times, mut solved, mut valid, mut bent, mut seconds, mut timed, mut length) =
             (Vec::new(), 0, 0, 0, 0.0, 0.0, 0.0);
         for seed in 0..count {
@@ -57,7 +58,10 @@ fn main() {
             length +=
                 path.windows(2).map(|e| e[0].iter().zip(&e[1]).map(|(a, b)| (a - b) * (a - b)).sum::<f64>().sqrt()).sum::<f64>();
             let limits = MotionLimits { velocity: vec![2.1; 7 * arms], acceleration: vec![7.0; 7 * arms] };
-            if let Some(trajectory) = time_path(&problem.world, &path, &limits, &PlanSettings::default()) {
+            let start = Instant::now();
+            let trajectory = time_path(&problem.world, &path, &limits, &PlanSettings::default());
+            timing += start.elapsed().as_secs_f64() * 1e3;
+            if let Some(trajectory) = trajectory {
                 timed += 1.0;
                 seconds += trajectory.duration();
             }
@@ -65,7 +69,7 @@ fn main() {
         times.sort_by(f64::total_cmp);
         println!(
             "{arms} arms{}: {solved}/{count} solved, {bent} not straight, {valid} valid at 0.002 rad, median {:.1} ms, 90 % {:.1} ms, \
-             max {:.0} ms, mean {:.1} ms; length {:.2} rad; {timed} timed, {:.2} s",
+             max {:.0} ms, mean {:.1} ms; length {:.2} rad; {timed} timed, {:.2} s, {:.1} ms each",
             if shelf { " and a shelf" } else { "" },
             times[times.len() / 2],
             times[times.len() * 9 / 10],
@@ -73,6 +77,7 @@ fn main() {
             times.iter().sum::<f64>() / times.len() as f64,
             length / f64::from(solved),
             seconds / timed,
+            timing / f64::from(solved),
         );
     }
 }

@@ -1,5 +1,5 @@
 //! Kinematic tables of the two robots, for tests only (joint frames and limits of the published models).
-#![allow(dead_code, unused_imports, reason = "each test file uses some of them")]
+#![allow(dead_code, reason = "each test file uses some of them")]
 
 pub(crate) mod problems;
 
