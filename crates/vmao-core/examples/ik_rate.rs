@@ -3,8 +3,10 @@
 #[path = "../tests/robots/mod.rs"]
 mod robots;
 
+use nalgebra::Vector3;
 use vmao_core::{
-    inverse_kinematics::{IkSettings, solve, solve_nearest},
+    geometry::{Pose, interpolate, rotation_exp},
+    inverse_kinematics::{IkSettings, solve, solve_nearest, track},
     random::Stream,
 };
 
@@ -31,5 +33,31 @@ fn main() {
             .filter(|goal| solve_nearest(&chain, goal, &seed, 12, &IkSettings::default(), &mut stream).solution().is_some())
             .count();
         println!("{name}: nearest of 12, {solved} of 1000 solved, {:.1} us each", start.elapsed().as_secs_f64() * 1e3);
+
+        // lines of 15 cm with a turn of 45 degrees, from anywhere well inside the limits, in 60 steps
+        let mut stream = Stream::new(2, &[]);
+        let (mut tracked, mut reachable, mut nanoseconds) = (0, 0, 0);
+        for _ in 0..500 {
+            let start: Vec<f64> =
+                chain.joints.iter().map(|joint| joint.lower + (joint.upper - joint.lower) * stream.range(0.15, 0.85)).collect();
+            let mut way = || Vector3::new(stream.normal(), stream.normal(), stream.normal()).normalize();
+            let from = chain.tool_pose(&start);
+            let to = Pose::from_parts(
+                (from.translation.vector + way() * 0.15).into(),
+                rotation_exp(&(way() * std::f64::consts::FRAC_PI_4)) * from.rotation,
+            );
+            if solve(&chain, &to, &start, &IkSettings::default(), &mut stream).solution().is_none() {
+                continue;
+            }
+            reachable += 1;
+            let poses: Vec<Pose> = (1..=60).map(|i| interpolate(&from, &to, f64::from(i) / 60.0)).collect();
+            let begun = std::time::Instant::now();
+            tracked += usize::from(track(&chain, &poses, &start, 0.2, &IkSettings::default()).is_ok());
+            nanoseconds += begun.elapsed().as_nanos();
+        }
+        println!(
+            "{name}: {tracked} of {reachable} lines tracked whose end is reachable, {:.1} us a pose",
+            nanoseconds as f64 / f64::from(reachable) / 60e3
+        );
     }
 }

@@ -131,13 +131,32 @@ pub struct CollisionChecker<'a> {
     local: Vec<(Collider, Convex)>,
     /// The same solids in the world at the last query.
     placed: Vec<Convex>,
-    pairs: Vec<(u32, u32)>,
+    /// Their centres, close together for the first rejection.
+    centers: Vec<Vector3<f64>>,
+    pairs: Vec<Pair>,
     over_floor: Vec<u32>,
+    /// The angles of the last query: arms that have not moved since are not placed again.
+    posed: Vec<f64>,
+}
+
+/// Two solids to compare, by index, and the sum of the radii of the balls around them.
+#[derive(Debug, Clone, Copy)]
+struct Pair {
+    first: u32,
+    second: u32,
+    reach: f64,
 }
 
 impl<'a> CollisionChecker<'a> {
-    /// Prepares `world`.
+    /// Prepares `world` with every arm able to move.
     pub fn new(world: &'a CollisionWorld) -> Self {
+        Self::with_frozen(world, &[])
+    }
+
+    /// Prepares `world` with the arms `frozen` at rest: pairs of which neither side can move are not compared.
+    ///
+    /// So arms at rest may stay in the contact they have, such as two grippers on one object.
+    pub fn with_frozen(world: &'a CollisionWorld, frozen: &[usize]) -> Self {
         let mut local = Vec::new();
         for (index, arm) in world.arms.iter().enumerate() {
             for LinkSolid { link, solid } in &arm.solids {
@@ -151,18 +170,25 @@ impl<'a> CollisionChecker<'a> {
         for (index, Obstacle { solid, .. }) in world.obstacles.iter().enumerate() {
             local.push((Collider::Obstacle(index), Convex::new(&solid.shape, &solid.carrier_from_solid)));
         }
+        let moves = |collider: Collider| match collider {
+            Collider::Link { arm, link } => link > 0 && !frozen.contains(&arm),
+            Collider::Held { arm } => !frozen.contains(&arm),
+            Collider::Obstacle(_) | Collider::Floor => false,
+        };
         let mut pairs = Vec::new();
         for i in 0..local.len() {
             for j in i + 1..local.len() {
-                if world.compares(local[i].0, local[j].0) {
-                    pairs.push((i as u32, j as u32));
+                if world.compares(local[i].0, local[j].0) && (moves(local[i].0) || moves(local[j].0)) {
+                    pairs.push(Pair { first: i as u32, second: j as u32, reach: local[i].1.bound() + local[j].1.bound() });
                 }
             }
         }
-        let floors = |collider: Collider| world.floor_height.is_some() && world.compares(collider, Collider::Floor);
+        let floors = |collider| world.floor_height.is_some() && world.compares(collider, Collider::Floor) && moves(collider);
         let over_floor = (0..local.len()).filter(|&i| floors(local[i].0)).map(|i| i as u32).collect();
         let placed = local.iter().map(|&(_, convex)| convex).collect();
-        Self { world, local, placed, pairs, over_floor }
+        let centers = local.iter().map(|(_, convex)| *convex.center()).collect();
+        let posed = vec![f64::NAN; world.joint_count()];
+        Self { world, local, placed, centers, pairs, over_floor, posed }
     }
 
     /// The first pair closer than `margin` (m) at the angles `q` (flat, arm after arm), `None` if all are clear.
@@ -190,10 +216,10 @@ impl<'a> CollisionChecker<'a> {
         let floor = self.world.floor_height.unwrap_or(f64::NEG_INFINITY);
         let heights = self.over_floor.iter().map(|&i| self.placed[i as usize].height_above(floor));
         let mut least = heights.fold(f64::INFINITY, f64::min);
-        for &(i, j) in &self.pairs {
-            let (a, b) = (&self.placed[i as usize], &self.placed[j as usize]);
-            if (a.center() - b.center()).norm() - a.bound() - b.bound() < least {
-                least = least.min(a.signed_distance(b));
+        for pair in &self.pairs {
+            let (i, j) = (pair.first as usize, pair.second as usize);
+            if (self.centers[i] - self.centers[j]).norm() - pair.reach < least {
+                least = least.min(self.placed[i].signed_distance(&self.placed[j]));
             }
         }
         least
@@ -204,8 +230,14 @@ impl<'a> CollisionChecker<'a> {
         if let Some(&low) = self.over_floor.iter().find(|&&i| self.placed[i as usize].height_above(floor) < margin) {
             return Some((low as usize, None));
         }
-        let touches = |&&(i, j): &&(u32, u32)| self.placed[i as usize].closer_than(&self.placed[j as usize], margin);
-        self.pairs.iter().find(touches).map(|&(i, j)| (i as usize, Some(j as usize)))
+        let touches = |pair: &&Pair| {
+            let (i, j) = (pair.first as usize, pair.second as usize);
+            let reach = pair.reach + margin;
+            reach > 0.0
+                && (self.centers[i] - self.centers[j]).norm_squared() < reach * reach
+                && self.placed[i].closer_than(&self.placed[j], margin)
+        };
+        self.pairs.iter().find(touches).map(|pair| (pair.first as usize, Some(pair.second as usize)))
     }
 
     /// Puts every solid of every arm where `q` has it.
@@ -213,19 +245,24 @@ impl<'a> CollisionChecker<'a> {
         assert_eq!(q.len(), self.world.joint_count(), "one angle per joint of all arms");
         let (mut slot, mut used) = (0, 0);
         for (index, arm) in self.world.arms.iter().enumerate() {
-            let links = world_from_links(arm, &q[used..used + arm.chain.len()]);
-            used += arm.chain.len();
+            let own = &q[used..used + arm.chain.len()];
+            let moved = own.is_empty() || own != &self.posed[used..used + own.len()];
+            used += own.len();
+            let links = if moved { world_from_links(arm, own) } else { Vec::new() };
             while let Some((collider, convex)) = self.local.get(slot) {
                 let link = match *collider {
-                    Collider::Link { arm, link } if arm == index => link,
-                    Collider::Held { arm } if arm == index => links.len() - 1,
+                    Collider::Link { arm: owner, link } if owner == index => link,
+                    Collider::Held { arm: owner } if owner == index => arm.chain.len(),
                     _ => break,
                 };
-                let (rotation, origin) = &links[link];
-                self.placed[slot] = convex.moved(rotation, origin);
+                if let Some((rotation, origin)) = links.get(link) {
+                    self.placed[slot].place(convex, rotation, origin);
+                    self.centers[slot] = *self.placed[slot].center();
+                }
                 slot += 1;
             }
         }
+        self.posed.copy_from_slice(q);
     }
 }
 

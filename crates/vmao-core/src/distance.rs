@@ -53,17 +53,19 @@ impl Convex {
         if local.bound == 0.0 {
             local.bound = local.generators[..local.count].iter().map(Vector3::norm).sum::<f64>() + local.radius;
         }
-        local.moved(frame_from_shape.rotation.to_rotation_matrix().matrix(), &frame_from_shape.translation.vector)
+        let mut placed = local;
+        placed.place(&local, frame_from_shape.rotation.to_rotation_matrix().matrix(), &frame_from_shape.translation.vector);
+        placed
     }
 
-    /// The same solid seen from a frame in which its present frame has this `rotation` and `origin`.
-    pub fn moved(&self, rotation: &Matrix3<f64>, origin: &Vector3<f64>) -> Self {
-        let mut moved = *self;
-        moved.center = rotation * self.center + origin;
-        for (to, from) in moved.generators.iter_mut().zip(&self.generators).take(self.count) {
+    /// Makes this `local` seen from a frame in which local's own frame has this `rotation` and `origin`.
+    ///
+    /// Both must come from the same shape: only what the motion changes is written.
+    pub fn place(&mut self, local: &Self, rotation: &Matrix3<f64>, origin: &Vector3<f64>) {
+        self.center = rotation * local.center + origin;
+        for (to, from) in self.generators.iter_mut().zip(&local.generators).take(local.count) {
             *to = rotation * from;
         }
-        moved
     }
 
     /// Radius of a ball around the centre that holds the whole solid (m).
@@ -91,7 +93,8 @@ impl Convex {
         let (generators, count) = self.difference(other);
         let (generators, offset) = (&generators[..count], self.center - other.center);
         let depth = separation(&offset, generators);
-        if depth < 0.0 {
+        // a flat set has no depth, only rounding; whether the origin is inside it is for the distance to say
+        if depth < -1e-12 * (self.bound + other.bound) {
             return depth - radius;
         }
         core_distance(&offset, generators, f64::INFINITY) - radius

@@ -5,6 +5,7 @@
 
 use crate::{
     collision::{CollisionChecker, CollisionPair, CollisionWorld},
+    joint_path::{Tree, at_length, blend, distance, largest_turn, length, remove_collinear},
     random::Stream,
     time_parameterization::{MotionLimits, Trajectory},
 };
@@ -23,7 +24,7 @@ pub struct PlanSettings {
     pub shortcut_iterations: usize,
     /// Least distance between things that must not touch (m).
     pub margin: f64,
-    /// Arms that stay at their start; they still are in the way.
+    /// Arms that stay at their start; they are in the way of the others, but may keep the contacts they have.
     pub frozen_arms: Vec<usize>,
 }
 
@@ -83,7 +84,7 @@ pub fn plan(world: &CollisionWorld, start: &[f64], goal: &[f64], settings: &Plan
     if let Some(pair) = planner.checker.check(&goal, settings.margin) {
         return PlanOutcome::Failed(PlanFailure::GoalInCollision(pair));
     }
-    let finest = settings.step / 5.0;
+    let finest = settings.step / FINER;
     for step in [settings.step, settings.step / 2.0, finest] {
         planner.step = step;
         let Some(mut path) = planner.find(start, &goal, stream) else { break };
@@ -96,19 +97,45 @@ pub fn plan(world: &CollisionWorld, start: &[f64], goal: &[f64], settings: &Plan
     PlanOutcome::Failed(PlanFailure::BudgetExhausted)
 }
 
-/// Times a path, cutting its corners as widely as stays free of collision by `margin` (m), sampled every 5 ms.
+/// The first edge of `path` that comes closer to a collision than the margin, and what collides there.
+///
+/// For paths made elsewhere, such as tracked lines of the tool; checked at a fifth of `settings.step`, like plans.
+/// Panics if a waypoint has not one angle per joint.
+pub fn first_collision(world: &CollisionWorld, path: &[Vec<f64>], settings: &PlanSettings) -> Option<(usize, CollisionPair)> {
+    let mut checker = CollisionChecker::with_frozen(world, &settings.frozen_arms);
+    if let Some(pair) = path.first().and_then(|start| checker.check(start, settings.margin)) {
+        return Some((0, pair));
+    }
+    path.windows(2).enumerate().find_map(|(edge, ends)| {
+        let count = (largest_turn(&ends[0], &ends[1]) / settings.step * FINER).ceil().max(1.0) as usize;
+        (1..=count).find_map(|i| {
+            let pair = checker.check(&blend(&ends[0], &ends[1], i as f64 / count as f64), settings.margin)?;
+            Some((edge, pair))
+        })
+    })
+}
+
+/// Times a path, cutting its corners as widely as stays free of collision by half the margin, sampled every 5 ms.
 ///
 /// Corners come within 0.2 rad of their waypoint down to 0.001 rad; with `None` even the least cut collides.
-pub fn time_path(world: &CollisionWorld, path: &[Vec<f64>], limits: &MotionLimits, margin: f64) -> Option<Trajectory> {
+pub fn time_path(
+    world: &CollisionWorld,
+    path: &[Vec<f64>],
+    limits: &MotionLimits,
+    settings: &PlanSettings,
+) -> Option<Trajectory> {
     const SAMPLE_PERIOD: f64 = 0.005;
-    let mut checker = CollisionChecker::new(world);
+    let mut checker = CollisionChecker::with_frozen(world, &settings.frozen_arms);
     [0.2, 0.05, 0.01, 0.001].into_iter().find_map(|deviation| {
         let trajectory = Trajectory::new(path, limits, deviation);
         let samples = (trajectory.duration() / SAMPLE_PERIOD).ceil() as usize;
-        let free = (0..=samples).all(|i| checker.is_free(&trajectory.at(i as f64 * SAMPLE_PERIOD).0, margin));
-        free.then_some(trajectory)
+        let mut free = |time: f64| checker.is_free(&trajectory.at(time).0, settings.margin / 2.0);
+        (0..=samples).all(|i| free(i as f64 * SAMPLE_PERIOD)).then_some(trajectory)
     })
 }
+
+/// How many times finer than `PlanSettings::step` a finished path is checked.
+const FINER: f64 = 5.0;
 
 struct Planner<'a> {
     world: &'a CollisionWorld,
@@ -129,7 +156,7 @@ impl<'a> Planner<'a> {
         Self {
             world,
             settings,
-            checker: CollisionChecker::new(world),
+            checker: CollisionChecker::with_frozen(world, &settings.frozen_arms),
             step: settings.step,
             samples_left: settings.max_iterations,
             free: arms().map(|(arm, _)| !settings.frozen_arms.contains(&arm)).collect(),
@@ -193,7 +220,7 @@ impl<'a> Planner<'a> {
                 }
             }
             // the smaller tree grows next, so that neither side stays a stub
-            side = usize::from(trees[1].parents.len() < trees[0].parents.len());
+            side = usize::from(trees[1].len() < trees[0].len());
         }
         None
     }
@@ -251,7 +278,8 @@ impl<'a> Planner<'a> {
             let mut candidate = path[..=first].to_vec();
             candidate.extend(stretch.iter().cloned());
             candidate.extend_from_slice(&path[last + 1..]);
-            if length(&candidate) < total - 1e-9 && self.is_free(&stretch) {
+            let start_is_free = |this: &mut Self| this.checker.is_free(&stretch[0], this.settings.margin);
+            if length(&candidate) < total - 1e-9 && start_is_free(self) && self.is_free(&stretch) {
                 candidate.dedup();
                 *path = candidate;
             }
@@ -275,51 +303,6 @@ impl<'a> Planner<'a> {
     }
 }
 
-/// Nodes of one search tree, root first.
-struct Tree {
-    width: usize,
-    points: Vec<f64>,
-    parents: Vec<usize>,
-}
-
-impl Tree {
-    fn new(root: &[f64]) -> Self {
-        Self { width: root.len(), points: root.to_vec(), parents: vec![0] }
-    }
-
-    fn point(&self, node: usize) -> &[f64] {
-        &self.points[node * self.width..(node + 1) * self.width]
-    }
-
-    fn push(&mut self, point: &[f64], parent: usize) -> usize {
-        self.points.extend_from_slice(point);
-        self.parents.push(parent);
-        self.parents.len() - 1
-    }
-
-    fn nearest(&self, target: &[f64]) -> usize {
-        let mut best = (f64::INFINITY, 0);
-        for (node, point) in self.points.chunks_exact(self.width).enumerate() {
-            let square = point.iter().zip(target).map(|(a, b)| (a - b) * (a - b)).sum();
-            if square < best.0 {
-                best = (square, node);
-            }
-        }
-        best.1
-    }
-
-    /// From `node` back to the root.
-    fn path_to(&self, node: usize) -> Vec<Vec<f64>> {
-        let mut path = vec![self.point(node).to_vec()];
-        let mut node = node;
-        while node != 0 {
-            node = self.parents[node];
-            path.push(self.point(node).to_vec());
-        }
-        path
-    }
-}
-
 fn orders(items: &[usize]) -> Vec<Vec<usize>> {
     if items.is_empty() {
         return vec![Vec::new()];
@@ -332,46 +315,4 @@ fn orders(items: &[usize]) -> Vec<Vec<usize>> {
         })
     };
     (0..items.len()).flat_map(led_by).collect()
-}
-
-fn blend(from: &[f64], to: &[f64], fraction: f64) -> Vec<f64> {
-    from.iter().zip(to).map(|(a, b)| a + (b - a) * fraction).collect()
-}
-
-fn largest_turn(a: &[f64], b: &[f64]) -> f64 {
-    a.iter().zip(b).map(|(x, y)| (x - y).abs()).fold(0.0, f64::max)
-}
-
-fn distance(a: &[f64], b: &[f64]) -> f64 {
-    a.iter().zip(b).map(|(x, y)| (x - y) * (x - y)).sum::<f64>().sqrt()
-}
-
-fn length(path: &[Vec<f64>]) -> f64 {
-    path.windows(2).map(|edge| distance(&edge[0], &edge[1])).sum()
-}
-
-/// The edge and the point that lie `along` the path (rad).
-fn at_length(path: &[Vec<f64>], along: f64) -> (usize, Vec<f64>) {
-    let mut left = along;
-    for (index, edge) in path.windows(2).enumerate() {
-        let edge_length = distance(&edge[0], &edge[1]);
-        if left < edge_length {
-            return (index, blend(&edge[0], &edge[1], left / edge_length));
-        }
-        left -= edge_length;
-    }
-    (path.len() - 2, path[path.len() - 1].clone())
-}
-
-/// Drops waypoints that lie on the line between their neighbours.
-fn remove_collinear(path: &mut Vec<Vec<f64>>) {
-    let mut i = 1;
-    while i + 1 < path.len() {
-        let (before, after) = (distance(&path[i - 1], &path[i]), distance(&path[i], &path[i + 1]));
-        if before + after - distance(&path[i - 1], &path[i + 1]) < 1e-12 * (before + after) {
-            path.remove(i);
-        } else {
-            i += 1;
-        }
-    }
 }

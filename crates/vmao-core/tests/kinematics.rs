@@ -6,7 +6,7 @@ use nalgebra::Vector3;
 use robots::{PANDA_HOME, SAWYER_NEUTRAL, panda, sawyer};
 use vmao_core::{
     geometry::{Pose, interpolate, pose, rotation_distance, rotation_log, translation},
-    inverse_kinematics::{IkOutcome, IkSettings, posture_cost, solve, solve_nearest, track},
+    inverse_kinematics::{IkOutcome, IkSettings, posture_cost, solutions, solve, solve_nearest, track},
     kinematics::SerialChain,
     random::Stream,
 };
@@ -164,4 +164,26 @@ fn tracking_names_the_first_pose_out_of_reach() {
     let poses: Vec<Pose> = (0..40).map(|i| translation(0.025 * f64::from(i), 0.0, 0.0) * from).collect();
     let index = track(&chain, &poses, &PANDA_HOME, 0.5, &IkSettings::default()).expect_err("a metre further out");
     assert!((2..20).contains(&index), "{index}");
+}
+
+#[test]
+fn several_distinct_solutions_come_cheapest_first() {
+    let settings = IkSettings::default();
+    for (chain, home) in [(panda(), PANDA_HOME), (sawyer(), SAWYER_NEUTRAL)] {
+        let goal = translation(0.0, 0.05, -0.05) * chain.tool_pose(&home);
+        let all = solutions(&chain, &goal, &home, 24, &settings, &mut Stream::new(6, &[]));
+        assert!(all.len() >= 2, "{}", all.len());
+        let nearest = solve_nearest(&chain, &goal, &home, 24, &settings, &mut Stream::new(6, &[]));
+        assert_eq!(nearest.solution(), Some(&all[0][..]));
+        for (i, q) in all.iter().enumerate() {
+            let (distance, angle) = gap(&chain.tool_pose(q), &goal);
+            assert!(distance < 1e-5 && angle < 1e-5 && chain.within_limits(q));
+            for later in &all[i + 1..] {
+                assert!(posture_cost(&chain, q, &home) <= posture_cost(&chain, later, &home));
+                assert!(q.iter().zip(later).any(|(a, b)| (a - b).abs() > 0.1));
+            }
+        }
+        let out_of_reach = translation(5.0, 0.0, 0.0);
+        assert!(solutions(&chain, &out_of_reach, &home, 4, &settings, &mut Stream::new(6, &[])).is_empty());
+    }
 }

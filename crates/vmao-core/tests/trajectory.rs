@@ -98,6 +98,21 @@ fn reversals_repeats_and_sharp_corners_keep_the_limits() {
     assert!(wide < stopping, "{wide} s against {stopping} s with stops");
 }
 
+#[test]
+fn a_corner_is_cut_by_just_the_deviation() {
+    let limits = MotionLimits { velocity: vec![1.0; 2], acceleration: vec![3.0; 2] };
+    let path = [vec![0.0, 0.0], vec![1.0, 0.0], vec![1.0, 1.0]];
+    for deviation in [0.001, 0.03, 0.15] {
+        let trajectory = check(&path, &limits, deviation);
+        let passes = |i: u32| {
+            let q = trajectory.at(trajectory.duration() * f64::from(i) / 20_000.0).0;
+            (q[0] - 1.0).hypot(q[1])
+        };
+        let nearest = (0..20_000).map(passes).fold(f64::INFINITY, f64::min);
+        assert!((nearest - deviation).abs() < 3e-4, "{nearest} rad from the corner, {deviation} asked for");
+    }
+}
+
 proptest! {
     #![proptest_config(ProptestConfig { cases: 60, failure_persistence: None, ..ProptestConfig::default() })]
 

@@ -236,7 +236,7 @@ impl<'a> Attempt<'a> {
             PlanOutcome::Failed(failure) => return Err(failure.to_string()),
         };
         let limits = self.limits(1.0);
-        let way = time_path(&world, &path, &limits, self.config.grasp.plan_margin * 0.5).ok_or("no free way to time the path")?;
+        let way = time_path(&world, &path, &limits, &settings).ok_or("no free way to time the path")?;
         let stretch: Vec<Vec<f64>> = (0..grasps[0].approach.len())
             .map(|i| {
                 let mut q = standoff.clone();

@@ -10,7 +10,7 @@ use vmao_core::collision::CollisionChecker;
 use vmao_core::contact::{ArmId, PartId};
 use vmao_core::geometry::{Pose, interpolate};
 use vmao_core::gripper_pose::{GripperPose, gripper_poses, squared};
-use vmao_core::inverse_kinematics::{IkSettings, posture_cost, solve_nearest, track};
+use vmao_core::inverse_kinematics::{IkSettings, posture_cost, solutions, track};
 use vmao_core::observation::{Observation, PointLabel};
 use vmao_core::outcome::FailureStage;
 use vmao_core::random::Stream;
@@ -82,6 +82,8 @@ impl Grasp {
 
 /// Waypoints of the straight approach, and the largest joint step between neighbouring waypoints of a motion (rad).
 const APPROACH_WAYPOINTS: usize = 6;
+/// Branches of joint solutions kept of each gripper pose.
+const BRANCHES: usize = 3;
 /// Free combinations of grasps that are handed to the planner.
 const PLANNED_COMBINATIONS: usize = 3;
 pub(crate) const MAX_JOINT_STEP: f64 = 0.6;
@@ -131,7 +133,7 @@ pub(crate) fn reachable_grasps(
         }
         above_table += 1;
         let world_from_tool = pose.backed_off(retreat);
-        found.extend(carried_grasp(
+        found.extend(carried_grasps(
             simulation,
             config,
             (arm, part),
@@ -158,7 +160,8 @@ fn object_cloud(observation: &Observation) -> Vec<Point3<f64>> {
         .collect()
 }
 
-fn carried_grasp(
+/// The ways in which the arm can take this gripper pose and carry it along the motion: different branches of its elbow and wrist.
+fn carried_grasps(
     simulation: &Simulation<'_>,
     config: &GraspConfig,
     (arm, part): (ArmId, PartId),
@@ -166,7 +169,7 @@ fn carried_grasp(
     opening: f64,
     part_motion: &[Pose],
     stream: &mut Stream,
-) -> Option<Grasp> {
+) -> Vec<Grasp> {
     let index = usize::from(arm.0);
     let chain = &simulation.chains[index];
     let base_from_world = simulation.scene.world_from_bases[index].inverse();
@@ -174,22 +177,23 @@ fn carried_grasp(
     let now = simulation.joint_positions(index);
     let standoff = base_from_world * pose.backed_off(config.standoff);
     let grasp = base_from_world * pose.world_from_tool;
-    let outcome = solve_nearest(chain, &standoff, now.as_slice(), config.ik_candidates, &settings, stream);
-    let start = outcome.solution()?;
+    let starts = solutions(chain, &standoff, now.as_slice(), config.ik_candidates, &settings, stream);
     let line: Vec<Pose> =
         (1..APPROACH_WAYPOINTS).map(|i| interpolate(&standoff, &grasp, i as f64 / (APPROACH_WAYPOINTS - 1) as f64)).collect();
-    let mut approach = vec![start.to_vec()];
-    approach.extend(track(chain, &line, start, MAX_JOINT_STEP, &settings).ok()?);
     let part_from_tool = part_motion[0].inverse() * pose.world_from_tool;
-    let carried: Vec<Pose> =
-        part_motion[1..].iter().map(|world_from_part| base_from_world * world_from_part * part_from_tool).collect();
-    let motion = track(chain, &carried, approach.last()?, MAX_JOINT_STEP, &settings).ok()?;
-    let home = &simulation.scene.robots[index].home;
+    let carried: Vec<Pose> = part_motion[1..].iter().map(|world_from_part| base_from_world * world_from_part * part_from_tool).collect();
     let preferred = preferred_approach(simulation, config, (index, part), &pose.world_from_tool);
-    let cost = config.approach_cost * (pose.world_from_tool.rotation * Vector3::z() - preferred).norm_squared()
-        + posture_cost(chain, start, now.as_slice())
-        + posture_cost(chain, motion.last()?, home);
-    Some(Grasp { arm, part, world_from_tool: pose.world_from_tool, opening, approach, carried: motion, cost })
+    let deviation = (pose.world_from_tool.rotation * Vector3::z() - preferred).norm_squared();
+    let home = &simulation.scene.robots[index].home;
+    let reach = |start: Vec<f64>| {
+        let mut approach = vec![start];
+        approach.extend(track(chain, &line, &approach[0], MAX_JOINT_STEP, &settings).ok()?);
+        let carried = track(chain, &carried, approach.last()?, MAX_JOINT_STEP, &settings).ok()?;
+        let posture = posture_cost(chain, &approach[0], now.as_slice()) + posture_cost(chain, carried.last()?, home);
+        let cost = config.approach_cost * deviation + posture;
+        Some(Grasp { arm, part, world_from_tool: pose.world_from_tool, opening, approach, carried, cost })
+    };
+    starts.into_iter().filter_map(reach).take(BRANCHES).collect()
 }
 
 /// The approach that leaves the other arms most room: down, leaning in from the arm's own side and from outside the object.

@@ -1,6 +1,8 @@
 //! Kinematic tables of the two robots, for tests only (joint frames and limits of the published models).
 #![allow(dead_code, reason = "each test file uses some of them")]
 
+pub(crate) mod problems;
+
 use nalgebra::{UnitQuaternion, Vector3};
 use std::f64::consts::{FRAC_PI_2, FRAC_PI_4};
 use vmao_core::{
