@@ -6,7 +6,7 @@ use crate::grasping::{Grasp, MAX_JOINT_STEP, compatible_grasps, ik_settings, joi
 use crate::planning_world::{Obstacles, collision_world};
 use crate::recorder::Recorder;
 use crate::scene::Scene;
-use crate::simulation::{Grip, Simulation, part_centers};
+use crate::simulation::{Grip, Simulation, hold_centers};
 use crate::task::{goal_errors, sample_goal, sample_start, threshold_factor};
 use crate::trial::{Recording, Trial, TrialConfig};
 use nalgebra::Point3;
@@ -424,7 +424,7 @@ impl<'a> Attempt<'a> {
 /// The assignment of arms to parts that keeps the arms' bases nearest to their parts; arm i to part i among equals.
 fn nearest_arms(scene: &Scene, start: &ObjectState) -> Vec<ArmId> {
     let count = scene.object.parts.len();
-    let centers = part_centers(scene, start);
+    let centers = hold_centers(scene, start);
     let distance = |arm: usize, part: usize| (centers[part].coords - scene.world_from_bases[arm].translation.vector).xy().norm();
     let mut best = ((0..count).collect::<Vec<_>>(), f64::INFINITY);
     permutations(count, &mut |order| {

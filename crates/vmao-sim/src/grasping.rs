@@ -181,7 +181,8 @@ fn carried_grasps(
     let line: Vec<Pose> =
         (1..APPROACH_WAYPOINTS).map(|i| interpolate(&standoff, &grasp, i as f64 / (APPROACH_WAYPOINTS - 1) as f64)).collect();
     let part_from_tool = part_motion[0].inverse() * pose.world_from_tool;
-    let carried: Vec<Pose> = part_motion[1..].iter().map(|world_from_part| base_from_world * world_from_part * part_from_tool).collect();
+    let carried: Vec<Pose> =
+        part_motion[1..].iter().map(|world_from_part| base_from_world * world_from_part * part_from_tool).collect();
     let preferred = preferred_approach(simulation, config, (index, part), &pose.world_from_tool);
     let deviation = (pose.world_from_tool.rotation * Vector3::z() - preferred).norm_squared();
     let home = &simulation.scene.robots[index].home;
@@ -206,7 +207,7 @@ fn preferred_approach(
     let level = |v: Vector3<f64>| Vector3::new(v.x, v.y, 0.0).try_normalize(1e-9).unwrap_or_else(Vector3::zeros);
     let here = world_from_tool.translation.vector;
     let forward = level(here - simulation.scene.world_from_bases[arm].translation.vector);
-    let others = simulation.part_centers().into_iter().enumerate().filter(|(other, _)| *other != usize::from(part.0));
+    let others = simulation.hold_centers().into_iter().enumerate().filter(|(other, _)| *other != usize::from(part.0));
     let inward: Vector3<f64> = others.map(|(_, center)| level(center.coords - here)).sum();
     (forward * config.lean_forward + level(inward) * config.lean_inward - Vector3::z()).normalize()
 }

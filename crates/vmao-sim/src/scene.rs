@@ -4,9 +4,11 @@ use crate::error::Error;
 use crate::mjcf;
 
 use mujoco_rs::wrappers::mj_model::{MjModel, MjtObjBase};
+use nalgebra::{Point3, Vector3};
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;
-use vmao_core::contact::{ArmId, PartId};
+use vmao_core::catalogue::CatalogueItem;
+use vmao_core::contact::{ArmId, ContactTuple, PartId};
 use vmao_core::geometry::Pose;
 use vmao_core::object::ArticulatedObject;
 use vmao_core::object_graph::ObjectGraph;
@@ -99,6 +101,10 @@ pub struct Scene {
     pub world_from_bases: Vec<Pose>,
     /// The object.
     pub object: ArticulatedObject,
+    /// Known ways to hold it (Algorithm 1's D).
+    pub demonstrations: Vec<ContactTuple>,
+    /// Where the demonstrations hold each part on average, part frame (m).
+    pub(crate) hold_centers: Vec<Point3<f64>>,
     /// Its graph.
     pub graph: ObjectGraph,
     /// The dependency root of its motions.
@@ -119,7 +125,9 @@ pub struct Scene {
 
 impl Scene {
     /// Compiles the scene. Fails if the simulator refuses the model.
-    pub fn new(config: &SceneConfig, robots: Vec<RobotModel>, object: ArticulatedObject) -> Result<Self, Error> {
+    pub fn new(config: &SceneConfig, robots: Vec<RobotModel>, item: CatalogueItem) -> Result<Self, Error> {
+        let hold_centers = hold_centers(&item);
+        let CatalogueItem { object, demonstrations } = item;
         let graph = ObjectGraph::of(&object).map_err(|cause| Error::Object { name: object.name.clone(), cause })?;
         if robots.len() != object.parts.len() {
             return Err(Error::ArmCount { arms: robots.len(), parts: object.parts.len(), object: object.name });
@@ -147,6 +155,8 @@ impl Scene {
             robots,
             world_from_bases,
             object,
+            demonstrations,
+            hold_centers,
             graph,
             root: PartId(0),
             mjcf,
@@ -162,6 +172,18 @@ impl Scene {
     }
 }
 
+/// The mean of all demonstrated finger points on each part; the part's origin where there is none.
+fn hold_centers(item: &CatalogueItem) -> Vec<Point3<f64>> {
+    (0..item.object.parts.len())
+        .map(|part| {
+            let contacts = item.demonstrations.iter().flatten().filter(|contact| usize::from(contact.part.0) == part);
+            let points: Vec<Point3<f64>> = contacts.flat_map(|contact| contact.fingers).collect();
+            let sum: Vector3<f64> = points.iter().map(|point| point.coords).sum();
+            Point3::from(sum / points.len().max(1) as f64)
+        })
+        .collect()
+}
+
 /// Base poses of `count` arms; all face the table's centre.
 fn base_poses(config: &SceneConfig, count: usize) -> Vec<Pose> {
     let Layout::Opposed = config.layout;
@@ -172,7 +194,7 @@ fn base_poses(config: &SceneConfig, count: usize) -> Vec<Pose> {
             let across = (place as f64 - (sides[side] as f64 - 1.0) / 2.0) * config.base_spacing;
             let turn = if side == 0 { 0.0 } else { std::f64::consts::PI };
             let x = if side == 0 { -config.base_distance } else { config.base_distance };
-            Pose::new(nalgebra::Vector3::new(x, across, 0.0), nalgebra::Vector3::z() * turn)
+            Pose::new(Vector3::new(x, across, 0.0), Vector3::z() * turn)
         })
         .collect()
 }

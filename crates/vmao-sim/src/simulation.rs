@@ -3,7 +3,7 @@
 use crate::convention::{Data, body_pose, free_joint_position, hinge_jacobian, joint_vector, mass_block};
 use crate::recorder::Recorder;
 use crate::scene::{Owner, Scene};
-use nalgebra::{Point3, Vector3, Vector6};
+use nalgebra::{Point3, Vector6};
 use vmao_core::contact::{ArmId, PartId};
 use vmao_core::geometry::Pose;
 use vmao_core::kinematics::SerialChain;
@@ -160,9 +160,9 @@ impl<'s> Simulation<'s> {
         }
     }
 
-    /// Where the middle of each part is, world frame (m).
-    pub(crate) fn part_centers(&self) -> Vec<Point3<f64>> {
-        part_centers(self.scene, &self.object_state())
+    /// Where each part is usually held, world frame (m).
+    pub(crate) fn hold_centers(&self) -> Vec<Point3<f64>> {
+        hold_centers(self.scene, &self.object_state())
     }
 
     /// The fastest motion of the object: over its free body (m/s and rad/s mixed) and its joints.
@@ -214,13 +214,7 @@ fn describe(owner: Owner) -> String {
     }
 }
 
-/// The volume centre of each part when the object is in `state`, world frame (m).
-pub(crate) fn part_centers(scene: &Scene, state: &ObjectState) -> Vec<Point3<f64>> {
-    let center = |(part, world_from_part): (&vmao_core::object::Part, &Pose)| {
-        let volume: f64 = part.solids.iter().map(|solid| solid.shape.volume()).sum();
-        let weighted =
-            part.solids.iter().map(|solid| solid.carrier_from_solid.translation.vector * (solid.shape.volume() / volume));
-        world_from_part * Point3::from(weighted.sum::<Vector3<f64>>())
-    };
-    scene.object.parts.iter().zip(&state.world_from_parts).map(center).collect()
+/// Where each part is usually held when the object is in `state`, world frame (m).
+pub(crate) fn hold_centers(scene: &Scene, state: &ObjectState) -> Vec<Point3<f64>> {
+    scene.hold_centers.iter().zip(&state.world_from_parts).map(|(center, world_from_part)| world_from_part * center).collect()
 }
