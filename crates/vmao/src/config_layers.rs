@@ -114,7 +114,7 @@ fn fitted(present: &Value, value: Value) -> Result<Value, Value> {
             None => Ok(Value::Array(values)),
             Some(first) => {
                 let fitted: Result<Vec<Value>, Value> = values.iter().map(|value| fitted(first, value.clone())).collect();
-                fitted.map(Value::Array).map_err(|_| Value::Array(values))
+                fitted.map(Value::Array).map_err(|_unfit| Value::Array(values))
             }
         },
         (present, value) if present.same_type(&value) => Ok(value),

@@ -1,6 +1,11 @@
 //! How a command ends without its result, and the exit code that says so.
 
-use std::{fmt, process::ExitCode};
+use std::{
+    cell::Cell,
+    fmt,
+    panic::{self, AssertUnwindSafe},
+    process::ExitCode,
+};
 
 /// Why a command ended without its result.
 ///
@@ -52,4 +57,28 @@ impl<T, E: Into<anyhow::Error>> OrBadInput<T> for Result<T, E> {
     fn or_bad_input(self) -> Result<T, Failure> {
         self.map_err(|error| Failure::BadInput(error.into()))
     }
+}
+
+thread_local! {
+    /// Whether a panic of this thread will be caught by [`contained`] and reported as an error.
+    static CONTAINED: Cell<bool> = const { Cell::new(false) };
+}
+
+/// Runs a foreign decoder that may panic on damaged input; none if it did.
+pub(crate) fn contained<T>(decode: impl FnOnce() -> T) -> Option<T> {
+    let before = CONTAINED.replace(true);
+    // What the decoder half built is dropped with its closure, so nothing broken is seen afterwards.
+    let result = panic::catch_unwind(AssertUnwindSafe(decode)).ok();
+    CONTAINED.set(before);
+    result
+}
+
+/// Keeps panics that end up as errors from printing; for the program, not for its library.
+pub(crate) fn silence_contained_panics() {
+    let report = panic::take_hook();
+    panic::set_hook(Box::new(move |info| {
+        if !CONTAINED.get() {
+            report(info);
+        }
+    }));
 }

@@ -96,7 +96,7 @@ mod tests {
     use crate::json::JsonPath;
 
     #[track_caller]
-    fn check(text: &str, path: JsonPath, rest: &str) {
+    fn check(text: &str, path: &JsonPath, rest: &str) {
         let offset = offset(text, &path.0).unwrap();
         assert!(text[offset..].starts_with(rest), "{path} leads to {}", &text[offset..]);
     }
@@ -104,13 +104,13 @@ mod tests {
     #[test]
     fn values_are_found_past_nested_and_escaped_ones() {
         let text = r#" {"a\"]" : [ {"x":"}{"}, [1, -2.5e3 , true] ], "b": {"c\u0041":  null}, "d": [] }"#;
-        check(text, JsonPath::default(), "{");
-        check(text, JsonPath::key("a\"]").at(1).at(1), "-2.5e3");
-        check(text, JsonPath::key("a\"]").at(0).then("x"), "\"}{\"");
-        check(text, JsonPath::key("b").then("cA"), "null");
+        check(text, &JsonPath::default(), "{");
+        check(text, &JsonPath::key("a\"]").at(1).at(1), "-2.5e3");
+        check(text, &JsonPath::key("a\"]").at(0).then("x"), "\"}{\"");
+        check(text, &JsonPath::key("b").then("cA"), "null");
         // What is not there is placed at what should hold it.
-        check(text, JsonPath::key("d").at(0), "[]");
-        check(text, JsonPath::key("b").then("e").at(3), "{\"c");
+        check(text, &JsonPath::key("d").at(0), "[]");
+        check(text, &JsonPath::key("b").then("e").at(3), "{\"c");
     }
 
     #[test]

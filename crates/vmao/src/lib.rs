@@ -5,6 +5,7 @@
 pub mod commands;
 pub mod config;
 mod config_layers;
+pub mod dataset;
 pub mod failure;
 pub mod json;
 mod json_place;

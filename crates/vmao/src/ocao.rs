@@ -152,7 +152,7 @@ pub fn answer(document: &Document) -> Result<Answer, DocumentError> {
     unique(document, "joint", &JsonPath::key("object").then("joints"), request.object.joints.iter().map(|j| &*j.name))?;
     unique(document, "gripper", &JsonPath::key("grippers"), request.grippers.iter().map(|gripper| &*gripper.name))?;
     let graph = graph(document, &request.object, &parts)?;
-    let root = parts.find(document, JsonPath::key("root"), &request.root)?;
+    let root = parts.find(document, &JsonPath::key("root"), &request.root)?;
 
     let joints = world_joints(document, &request.object, &parts)?;
     let deltas = joint_deltas(document, &request)?;
@@ -172,7 +172,7 @@ pub fn answer(document: &Document) -> Result<Answer, DocumentError> {
     }
     for (index, gripper) in request.grippers.iter().enumerate() {
         let path = JsonPath::key("grippers").at(index);
-        let part = usize::from(parts.find(document, path.clone().then("part"), &gripper.part)?.0);
+        let part = usize::from(parts.find(document, &path.clone().then("part"), &gripper.part)?.0);
         let world_from_gripper = pose(document, path.clone().then("pose"), &gripper.pose)?;
         let goal = gripper_goal(&world_from_parts[part], &goals[part], &world_from_gripper);
         if !finite(&goal) {
@@ -213,8 +213,8 @@ impl<'a> PartNames<'a> {
         Ok(Self { ids, parts })
     }
 
-    fn find(&self, document: &Document, path: JsonPath, name: &str) -> Result<PartId, DocumentError> {
-        let missing = || document.refuse(&path, unknown("object", "part", name, self.parts.iter().map(|part| &*part.name)));
+    fn find(&self, document: &Document, path: &JsonPath, name: &str) -> Result<PartId, DocumentError> {
+        let missing = || document.refuse(path, unknown("object", "part", name, self.parts.iter().map(|part| &*part.name)));
         self.ids.get(name).copied().ok_or_else(missing)
     }
 
@@ -244,8 +244,8 @@ fn graph(document: &Document, object: &ObjectRequest, parts: &PartNames<'_>) -> 
     let mut edges = Vec::with_capacity(object.joints.len());
     for (index, joint) in object.joints.iter().enumerate() {
         let path = list.clone().at(index);
-        let parent = parts.find(document, path.clone().then("parent"), &joint.parent)?;
-        edges.push((parent, parts.find(document, path.then("child"), &joint.child)?));
+        let parent = parts.find(document, &path.clone().then("parent"), &joint.parent)?;
+        edges.push((parent, parts.find(document, &path.then("child"), &joint.child)?));
     }
     ObjectGraph::new(object.parts.len(), &edges).map_err(|error| match &error {
         GraphError::SelfJoint { joint, .. } => {

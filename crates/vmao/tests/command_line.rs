@@ -1,4 +1,5 @@
 //! The conventions of every command, through the real binary: exit codes, streams, saved configuration.
+#![expect(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
 use std::{
     fs,

@@ -9,7 +9,7 @@ mod session;
 pub use session::{CommonOptions, Session};
 
 use crate::{
-    failure::Failure,
+    failure::{Failure, silence_contained_panics},
     output::{log, print},
 };
 use clap::{Parser, Subcommand};
@@ -33,6 +33,7 @@ enum Command {
 
 /// Runs the program on these arguments, its own name first: 0 done, 1 the work failed, 2 bad input or usage.
 pub fn main(arguments: impl IntoIterator<Item = OsString>) -> ExitCode {
+    silence_contained_panics();
     let arguments: Vec<OsString> = arguments.into_iter().collect();
     let line = match CommandLine::try_parse_from(&arguments) {
         Ok(line) => line,
