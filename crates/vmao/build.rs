@@ -13,7 +13,7 @@ fn main() {
     let ours = git(&["ls-files", "--error-unmatch", "build.rs"]).is_some();
     let commit = if ours { git(&["rev-parse", "HEAD"]) } else { None };
     // The log of HEAD grows with every commit and checkout.
-    if let Some(log) = git(&["rev-parse", "--git-path", "logs/HEAD"]).filter(|log| ours && Path::new(log).exists()) {
+    if let Some(log) = git(&["rev-parse", "--git-path", "logs/HEAD"]).filter(|log| Path::new(log).exists()) {
         println!("cargo::rerun-if-changed={log}");
     }
     println!("cargo::rustc-env=VMAO_COMMIT={}", commit.as_deref().unwrap_or("unknown"));
