@@ -1,5 +1,7 @@
-//! Object-centric control (OCAO; supplement, appendix A, Eq. 1 and 2): from the motion of one part and the changes of
-//! all joints to the motion of every part and every gripper. Axes and anchors are those before the motion, in the world.
+//! Object-centric control (OCAO; supplement, appendix A, Eq. 1 and 2).
+//!
+//! From the motion of one part and the changes of all joints to the motion of every part and every gripper.
+//! Axes and anchors are those before the motion, in the world frame.
 
 use crate::{
     contact::PartId,

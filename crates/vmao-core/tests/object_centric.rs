@@ -1,5 +1,6 @@
 //! Object-centric control against plain forward kinematics: homogeneous matrices, Rodrigues' formula, products of
 //! exponentials from part 0. It shares no code and no formulation with the quaternion motions under test.
+#![expect(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
 use nalgebra::{Matrix3, Matrix4, Point3, Rotation3, Unit, UnitQuaternion, Vector3};
 use proptest::prelude::{ProptestConfig, Strategy, any, prop_oneof, proptest};
@@ -18,8 +19,11 @@ const TOLERANCE: f64 = 1e-9;
 /// A tree of joints given in the world at zero, and the parts' frames there (anywhere: they need not coincide).
 struct Mechanism {
     parts_at_zero: Vec<Matrix4<f64>>,
-    joints: Vec<(JointKind, usize, usize, Vector3<f64>, Vector3<f64>)>,
+    joints: Vec<MechanismJoint>,
 }
+
+/// Kind, parent, child, anchor and axis, in the world at zero.
+type MechanismJoint = (JointKind, usize, usize, Vector3<f64>, Vector3<f64>);
 
 #[derive(Debug, Clone, Copy)]
 enum Topology {
@@ -69,7 +73,7 @@ impl Mechanism {
 
     fn world_joints(&self, base: &Matrix4<f64>, positions: &[f64]) -> Vec<WorldJoint> {
         let motions = self.motions(base, positions);
-        let place = |&(kind, parent, child, anchor, axis): &(JointKind, usize, usize, Vector3<f64>, Vector3<f64>)| WorldJoint {
+        let place = |&(kind, parent, child, anchor, axis): &MechanismJoint| WorldJoint {
             kind,
             parent: PartId(parent as u16),
             child: PartId(child as u16),
@@ -227,18 +231,17 @@ proptest! {
 fn random_object(stream: &mut Stream, count: usize) -> ArticulatedObject {
     let mechanism = Mechanism::random(stream, count, Topology::Random);
     let part = |index| Part { name: format!("part-{index}"), solids: Vec::new(), mass: 0.1 };
-    let joint =
-        |(index, &(kind, parent, child, anchor, axis)): (usize, &(JointKind, usize, usize, Vector3<f64>, Vector3<f64>))| Joint {
-            name: format!("joint-{index}"),
-            kind,
-            parent: PartId(parent as u16),
-            child: PartId(child as u16),
-            anchor: Point3::from(anchor),
-            axis: Unit::new_normalize(axis),
-            limits: None,
-            damping: 0.0,
-            friction: 0.0,
-        };
+    let joint = |(index, &(kind, parent, child, anchor, axis)): (usize, &MechanismJoint)| Joint {
+        name: format!("joint-{index}"),
+        kind,
+        parent: PartId(parent as u16),
+        child: PartId(child as u16),
+        anchor: Point3::from(anchor),
+        axis: Unit::new_normalize(axis),
+        limits: None,
+        damping: 0.0,
+        friction: 0.0,
+    };
     let joints = mechanism.joints.iter().enumerate().map(joint).collect();
     ArticulatedObject { name: "random".into(), parts: (0..count).map(part).collect(), joints }
 }

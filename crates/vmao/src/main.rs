@@ -1,2 +1,5 @@
-//! The vmao program.
-fn main() {}
+//! The `vmao` program.
+
+fn main() -> std::process::ExitCode {
+    vmao::commands::main(std::env::args_os())
+}

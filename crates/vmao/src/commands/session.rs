@@ -1,0 +1,84 @@
+//! The options that every command takes, and what they resolve to.
+
+use crate::{
+    config::Config,
+    failure::{Failure, OrBadInput},
+    output::{Layout, print_json},
+    provenance::RunInfo,
+};
+use anyhow::Context;
+use serde::Serialize;
+use std::{
+    fs,
+    num::NonZeroUsize,
+    path::{Path, PathBuf},
+    thread,
+};
+
+/// The options that every command takes.
+#[derive(Debug, Clone, clap::Args)]
+#[command(next_help_heading = "Options of every command")]
+pub struct CommonOptions {
+    /// Configuration file, over the shipped one
+    #[arg(long, value_name = "FILE.toml")]
+    pub config: Option<PathBuf>,
+    /// Change one value of the configuration; may be repeated
+    #[arg(long = "set", value_name = "SECTION.KEY=VALUE")]
+    pub settings: Vec<String>,
+    /// Seed: with the configuration and a trial's number it decides everything
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    pub seed: u64,
+    /// Threads; never changes a result [default: all cores]
+    #[arg(long, value_name = "N")]
+    pub workers: Option<NonZeroUsize>,
+    /// Directory for what is written
+    #[arg(long, value_name = "DIR")]
+    pub out: Option<PathBuf>,
+    /// One JSON document on stdout
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// A command's resolved surroundings.
+#[derive(Debug, Clone)]
+pub struct Session {
+    /// The configuration.
+    pub config: Config,
+    /// What is saved as `run.json`.
+    pub info: RunInfo,
+    /// Threads to use.
+    pub workers: usize,
+    /// The directory asked for.
+    pub out: Option<PathBuf>,
+    /// Whether stdout is for a program or for a person.
+    pub layout: Layout,
+}
+
+impl Session {
+    /// Resolves the options; a configuration that cannot be used is bad input.
+    pub fn start(options: &CommonOptions, command_line: &[String]) -> Result<Self, Failure> {
+        let config = Config::load(options.config.as_deref(), &options.settings).or_bad_input()?;
+        let info = RunInfo::new(command_line, options.seed, &config)?;
+        let cores = || thread::available_parallelism().map_or(1, NonZeroUsize::get);
+        Ok(Self {
+            config,
+            info,
+            workers: options.workers.map_or_else(cores, NonZeroUsize::get),
+            out: options.out.clone(),
+            layout: if options.json { Layout::Line } else { Layout::Indented },
+        })
+    }
+
+    /// The output directory, `--out` or `default`: made if need be, with the configuration and `run.json` in it.
+    pub fn output_directory(&self, default: &Path) -> Result<PathBuf, Failure> {
+        let directory = self.out.as_deref().unwrap_or(default);
+        fs::create_dir_all(directory).with_context(|| format!("{}: cannot be made a directory", directory.display()))?;
+        self.info.save(directory, &self.config).with_context(|| format!("{}: cannot be written to", directory.display()))?;
+        Ok(directory.to_owned())
+    }
+
+    /// Writes a JSON document to stdout, on one line with `--json`.
+    pub fn print<T: Serialize>(&self, document: &T) -> Result<(), Failure> {
+        Ok(print_json(document, self.layout).context("stdout")?)
+    }
+}

@@ -1,0 +1,280 @@
+//! The configuration of a run. The shipped file is the experiment: there are no defaults anywhere else.
+//!
+//! To add a constant: one commented line in `configs/demo.toml`, one field here, one line in [`Config::check`].
+
+use crate::{
+    config_layers::{self, Layer},
+    provenance::sha256_hex,
+    results::Method,
+};
+use serde::{Deserialize, Serialize};
+use std::path::Path;
+use vmao_core::order::GraspOrder;
+
+/// The configuration shipped with the program.
+pub const SHIPPED: &str = include_str!("../../../configs/demo.toml");
+
+/// A configuration that cannot be used; the message says where it came from.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error("{origin}: {message}")]
+pub struct ConfigError {
+    /// The file and place, or the option.
+    pub origin: String,
+    /// What was found, what was expected, what exists.
+    pub message: String,
+}
+
+/// A complete configuration.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Config {
+    /// What is manipulated.
+    pub object: ObjectConfig,
+    /// Who manipulates.
+    pub robots: RobotsConfig,
+    /// How a trial goes.
+    pub trial: TrialConfig,
+    /// Where goals are drawn from.
+    pub goal: GoalConfig,
+    /// What counts as having reached a goal.
+    pub thresholds: ThresholdConfig,
+    /// Algorithm 1.
+    pub explore: ExploreConfig,
+    /// The network and its training.
+    pub train: toml::Table,
+    /// The cells of the table.
+    pub evaluate: EvaluateConfig,
+}
+
+/// What is manipulated.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ObjectConfig {
+    /// A name of the catalogue.
+    pub name: String,
+}
+
+/// Who manipulates.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct RobotsConfig {
+    /// One arm each.
+    pub names: Vec<String>,
+    /// How the arms stand around the table.
+    pub layout: String,
+}
+
+/// How a trial goes.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct TrialConfig {
+    /// The grasp order.
+    pub order: GraspOrder,
+}
+
+/// Where goals are drawn from; each a [lowest, highest] pair, relative to the start.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct GoalConfig {
+    /// Upwards (m).
+    pub lift: [f64; 2],
+    /// Along a random horizontal direction (m).
+    pub sideways: [f64; 2],
+    /// About the vertical (degrees).
+    pub yaw_deg: [f64; 2],
+    /// About a random horizontal axis (degrees).
+    pub tilt_deg: [f64; 2],
+    /// Size of every joint's change (degrees).
+    pub joint_change_deg: [f64; 2],
+}
+
+/// What counts as having reached a goal.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ThresholdConfig {
+    /// Of every part (m).
+    pub position: f64,
+    /// Of every part (degrees).
+    pub rotation_deg: f64,
+    /// Of every joint (degrees).
+    pub joint_deg: f64,
+    /// How long all must be met (s).
+    pub hold_seconds: f64,
+}
+
+/// Algorithm 1.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ExploreConfig {
+    /// Neighbourhood that new contacts are drawn from (m).
+    pub radius: f64,
+    /// Trials that share one frozen label set.
+    pub round_size: u64,
+    /// Successes wanted.
+    pub successes: u64,
+    /// Trials at most.
+    pub max_trials: u64,
+}
+
+/// The cells of the table.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct EvaluateConfig {
+    /// Trials of each cell.
+    pub trials: u64,
+    /// The grasp orders compared.
+    pub orders: Vec<GraspOrder>,
+    /// The methods compared.
+    pub methods: Vec<Method>,
+}
+
+impl Config {
+    /// The shipped configuration, changed by a file and then by `section.key=value` settings in turn.
+    pub fn load(file: Option<&Path>, settings: &[String]) -> Result<Self, ConfigError> {
+        let mut layers = Vec::new();
+        if let Some(path) = file {
+            layers.push(Layer::file(path)?);
+        }
+        for setting in settings {
+            layers.push(Layer::Setting(setting.clone()));
+        }
+        let refuse = |message: String| ConfigError { origin: "configuration".to_owned(), message };
+        let shipped: toml::Table = SHIPPED.parse().map_err(|error: toml::de::Error| refuse(error.to_string()))?;
+        let merged = config_layers::merge(shipped, &layers)?;
+        let config: Self = serde_path_to_error::deserialize(merged)
+            .map_err(|error| refuse(format!("{}: {}", error.path(), error.inner().message().trim())))?;
+        config.check().map_err(refuse)?;
+        Ok(config)
+    }
+
+    /// The configuration as TOML text, the same for equal configurations.
+    pub fn to_toml(&self) -> Result<String, ConfigError> {
+        let refuse = |error: toml::ser::Error| ConfigError { origin: "configuration".to_owned(), message: error.to_string() };
+        toml::to_string(self).map_err(refuse)
+    }
+
+    /// SHA-256 of [`Config::to_toml`]: that of the `config.toml` beside an output.
+    pub fn sha256(&self) -> Result<String, ConfigError> {
+        self.to_toml().map(|text| sha256_hex(text.as_bytes()))
+    }
+
+    fn check(&self) -> Result<(), String> {
+        let Self { object, robots, trial: _, goal, thresholds, explore, train: _, evaluate } = self;
+        ensure(!object.name.is_empty(), "object.name", "an empty name", "a name of the catalogue")?;
+        ensure(!robots.names.is_empty(), "robots.names", "no arms", "at least one")?;
+        range("goal.lift", goal.lift, 0.0, 2.0)?;
+        range("goal.sideways", goal.sideways, 0.0, 2.0)?;
+        range("goal.yaw_deg", goal.yaw_deg, -180.0, 180.0)?;
+        range("goal.tilt_deg", goal.tilt_deg, 0.0, 90.0)?;
+        range("goal.joint_change_deg", goal.joint_change_deg, 0.0, 360.0)?;
+        positive("thresholds.position", thresholds.position)?;
+        positive("thresholds.rotation_deg", thresholds.rotation_deg)?;
+        positive("thresholds.joint_deg", thresholds.joint_deg)?;
+        within("thresholds.hold_seconds", thresholds.hold_seconds, 0.0, 60.0)?;
+        positive("explore.radius", explore.radius)?;
+        at_least_one("explore.round_size", explore.round_size)?;
+        at_least_one("explore.successes", explore.successes)?;
+        at_least_one("explore.max_trials", explore.max_trials)?;
+        at_least_one("evaluate.trials", evaluate.trials)?;
+        ensure(!evaluate.orders.is_empty(), "evaluate.orders", "no orders", "at least one")?;
+        ensure(!evaluate.methods.is_empty(), "evaluate.methods", "no methods", "at least one")
+    }
+}
+
+fn ensure(holds: bool, key: &str, found: &str, expected: &str) -> Result<(), String> {
+    if holds { Ok(()) } else { Err(format!("{key}: {found}, expected {expected}")) }
+}
+
+fn positive(key: &str, value: f64) -> Result<(), String> {
+    ensure(value > 0.0 && value.is_finite(), key, &value.to_string(), "a positive finite number")
+}
+
+fn within(key: &str, value: f64, lowest: f64, highest: f64) -> Result<(), String> {
+    ensure(value >= lowest && value <= highest, key, &value.to_string(), &format!("{lowest} to {highest}"))
+}
+
+fn range(key: &str, [low, high]: [f64; 2], lowest: f64, highest: f64) -> Result<(), String> {
+    let expected = format!("[low, high] with {lowest} ≤ low ≤ high ≤ {highest}");
+    ensure(lowest <= low && low <= high && high <= highest, key, &format!("[{low}, {high}]"), &expected)
+}
+
+fn at_least_one(key: &str, value: u64) -> Result<(), String> {
+    ensure(value >= 1, key, &value.to_string(), "at least 1")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn set(settings: &[&str]) -> Result<Config, String> {
+        let settings: Vec<String> = settings.iter().map(|&setting| setting.to_owned()).collect();
+        Config::load(None, &settings).map_err(|error| error.to_string())
+    }
+
+    #[test]
+    fn the_shipped_configuration_is_the_documented_experiment() {
+        let config = set(&[]).unwrap();
+        assert_eq!(config.robots.names, ["panda", "panda"]);
+        assert_eq!((config.goal.lift, config.thresholds.position), ([0.08, 0.20], 0.02));
+    }
+
+    #[test]
+    fn every_shipped_constant_says_where_it_comes_from() {
+        let mut section_reason = false;
+        for line in SHIPPED.lines().filter(|line| !line.trim().is_empty() && !line.starts_with('#')) {
+            let sourced = line
+                .split_once('#')
+                .is_some_and(|(_, why)| ["§", "appendix", "ours, because", "D"].iter().any(|s| why.contains(s)));
+            if line.starts_with('[') {
+                section_reason = sourced;
+            } else {
+                assert!(sourced || (section_reason && line.contains('#')), "{line}");
+            }
+        }
+    }
+
+    #[test]
+    fn settings_apply_in_turn_and_bare_words_are_strings() {
+        let config = set(&[
+            "trial.order=parallel",
+            "robots.names=[\"sawyer\"]",
+            "goal.lift=[0, 0.1]",
+            "object.name=sticks-4",
+            "thresholds.position=1",
+            "thresholds.position = 0.5",
+        ])
+        .unwrap();
+        assert_eq!((config.trial.order, config.goal.lift), (GraspOrder::Parallel, [0.0, 0.1]));
+        assert_eq!((&*config.object.name, config.thresholds.position), ("sticks-4", 0.5));
+    }
+
+    #[test]
+    fn resolved_text_reads_back_and_its_hash_follows_the_values() {
+        let config = set(&["explore.radius=0.03"]).unwrap();
+        let back: Config = toml::from_str(&config.to_toml().unwrap()).unwrap();
+        assert_eq!(back, config);
+        assert_eq!(config.sha256().unwrap(), sha256_hex(config.to_toml().unwrap().as_bytes()));
+        assert_ne!(config.sha256().unwrap(), set(&[]).unwrap().sha256().unwrap());
+    }
+
+    #[test]
+    fn values_out_of_range_are_refused_with_what_is_expected() {
+        for (setting, message) in [
+            ("goal.lift=[0.2, 0.1]", "configuration: goal.lift: [0.2, 0.1], expected [low, high] with 0 ≤ low ≤ high ≤ 2"),
+            ("goal.tilt_deg=[nan, 1.0]", "goal.tilt_deg: [NaN, 1], expected [low, high]"),
+            ("thresholds.position=-0.1", "thresholds.position: -0.1, expected a positive finite number"),
+            ("thresholds.joint_deg=inf", "thresholds.joint_deg: inf, expected a positive finite number"),
+            ("explore.round_size=0", "explore.round_size: 0, expected at least 1"),
+            ("explore.round_size=-1", "explore.round_size: invalid value: integer `-1`, expected u64"),
+            ("goal.lift=[1.0]", "goal.lift: invalid length 1, expected an array of length 2"),
+            (
+                "trial.order=backwards",
+                "unknown variant `backwards`, expected one of `parallel`, `sequential-parallel`, `sequential`",
+            ),
+            ("evaluate.methods=[]", "evaluate.methods: no methods, expected at least one"),
+        ] {
+            let error = set(&[setting]).unwrap_err();
+            assert!(error.contains(message), "{setting}: {error}");
+        }
+    }
+}

@@ -1,0 +1,16 @@
+//! The program around the method: configuration, command line, data set, results.
+//!
+//! It knows files and people; the simulator's pointers and the network's tensors stay in their own crates.
+
+pub mod commands;
+pub mod config;
+mod config_layers;
+pub mod dataset;
+pub mod failure;
+pub mod json;
+mod json_place;
+pub mod ocao;
+pub mod output;
+pub mod provenance;
+pub mod results;
+pub mod wording;

@@ -1,0 +1,109 @@
+//! Where an output came from: program, commit, configuration, seed and command, saved beside every output.
+
+use crate::{
+    config::{Config, ConfigError},
+    json::{Document, DocumentError, JsonPath},
+    output::write_whole,
+};
+use serde::{Deserialize, Serialize};
+use sha2::{Digest, Sha256};
+use std::{io, io::Write, path::Path};
+
+/// The program's version.
+pub const VERSION: &str = env!("CARGO_PKG_VERSION");
+
+/// The commit that the program was built from; `unknown` outside a checkout.
+pub const COMMIT: &str = env!("VMAO_COMMIT");
+
+/// `run.json`: enough to make an output again.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct RunInfo {
+    /// Version of this layout.
+    pub schema: u32,
+    /// Version of the program.
+    pub version: String,
+    /// Commit of the program.
+    pub commit: String,
+    /// The command line, the program's own path cut to its name.
+    pub command: Vec<String>,
+    /// Seed of the run.
+    pub seed: u64,
+    /// SHA-256 of `config.toml`.
+    pub config_sha256: String,
+}
+
+impl RunInfo {
+    /// What is known of the run that executes `arguments` with this configuration.
+    pub fn new(arguments: &[String], seed: u64, config: &Config) -> Result<Self, ConfigError> {
+        let command = std::iter::once("vmao".to_owned()).chain(arguments.iter().skip(1).cloned()).collect();
+        let (version, commit) = (VERSION.to_owned(), COMMIT.to_owned());
+        Ok(Self { schema: 1, version, commit, command, seed, config_sha256: config.sha256()? })
+    }
+
+    /// Reads the `run.json` of `directory`.
+    pub fn load(directory: &Path) -> Result<Self, DocumentError> {
+        Document::read(&directory.join("run.json"))?.parse()
+    }
+
+    /// Refuses to go on with the run in `directory` under another seed or configuration: it would mix two runs.
+    pub fn check_same_run(&self, directory: &Path) -> Result<(), DocumentError> {
+        let document = Document::read(&directory.join("run.json"))?;
+        let there: Self = document.parse()?;
+        if there.seed != self.seed {
+            let message = format!("a run with seed {}, expected {} to resume it", there.seed, self.seed);
+            return Err(document.refuse(&JsonPath::key("seed"), message));
+        }
+        if there.config_sha256 != self.config_sha256 {
+            let message = "a run with another configuration; compare the config.toml beside it".to_owned();
+            return Err(document.refuse(&JsonPath::key("config_sha256"), message));
+        }
+        Ok(())
+    }
+
+    /// Writes `config.toml` and `run.json` into `directory`.
+    pub fn save(&self, directory: &Path, config: &Config) -> io::Result<()> {
+        let text = config.to_toml().map_err(io::Error::other)?;
+        write_whole(&directory.join("config.toml"), |file| file.write_all(text.as_bytes()))?;
+        let json = serde_json::to_string_pretty(self)?;
+        write_whole(&directory.join("run.json"), |file| writeln!(file, "{json}"))
+    }
+}
+
+/// SHA-256 in lower-case hexadecimal.
+pub fn sha256_hex(bytes: &[u8]) -> String {
+    hex(&Sha256::digest(bytes))
+}
+
+/// Bytes in lower-case hexadecimal.
+pub fn hex(bytes: &[u8]) -> String {
+    bytes.iter().map(|byte| format!("{byte:02x}")).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_run_is_resumed_with_its_own_seed_and_configuration_only() {
+        let directory = tempfile::tempdir().unwrap();
+        let run = |seed, setting: &str| {
+            let config = Config::load(None, &[setting.to_owned()]).unwrap();
+            (RunInfo::new(&["bin/vmao".into(), "explore".into()], seed, &config).unwrap(), config)
+        };
+        let (info, config) = run(3, "explore.radius=0.03");
+        info.save(directory.path(), &config).unwrap();
+        assert_eq!(RunInfo::load(directory.path()).unwrap(), info);
+        assert_eq!(info.command, ["vmao", "explore"]);
+        run(3, "explore.radius=0.030").0.check_same_run(directory.path()).unwrap();
+        let refused = |(info, _): (RunInfo, Config)| info.check_same_run(directory.path()).unwrap_err().to_string();
+        assert!(refused(run(4, "explore.radius=0.03")).contains("seed (line 9, column 11): a run with seed 3, expected 4"));
+        assert!(refused(run(3, "explore.radius=0.04")).contains("config_sha256 (line 10"));
+    }
+
+    #[test]
+    fn the_hash_is_the_published_one() {
+        // FIPS 180-2, appendix B.1.
+        let abc = "ba7816bf8f01cfea414140de5dae2223b00361a396177a9cb410ff61f20015ad";
+        assert_eq!(sha256_hex(b"abc"), abc);
+    }
+}
