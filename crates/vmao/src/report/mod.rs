@@ -8,7 +8,7 @@ mod pack;
 mod page;
 
 pub use data::{
-    Cell, ContactMapFigure, ExplorationRound, ExplorationSummary, LatentMap, Provenance, ReportData, RolloutFigure, ThresholdPoint,
-    TrainingCurve, TrainingEpoch,
+    Cell, ContactMapFigure, ExplorationRound, ExplorationSummary, LatentMap, Provenance, ReportData, RolloutFigure,
+    ThresholdPoint, TrainingCurve, TrainingEpoch,
 };
 pub use page::render;

@@ -93,8 +93,11 @@ pub(super) fn rollout<S: Serializer>(rollout: &Rollout, serializer: S) -> Result
         .map(|body| {
             let (_, kind, index) = kind(body.label);
             let solids = body.solids.iter();
-            let solids =
-                solids.map(|solid| PackedSolid { shape: &solid.shape, pose: seven(&solid.carrier_from_solid), color: solid.color });
+            let solids = solids.map(|solid| PackedSolid {
+                shape: &solid.shape,
+                pose: seven(&solid.carrier_from_solid),
+                color: solid.color,
+            });
             PackedBody { name: &body.name, kind, index, solids: solids.collect() }
         })
         .collect();
