@@ -107,8 +107,8 @@ try {
     await slider.evaluate((node, value) => { node.value = value; node.dispatchEvent(new Event("input", { bubbles: true })); }, String(end * 0.62));
     await page.waitForTimeout(600);
     check(`player ${i + 1}: the slider seeks`, Math.abs(await time() - end * 0.62) < 0.05 && (await player.locator(".clock").textContent()).startsWith((end * 0.62).toFixed(2)));
-    for (const camera of ["Front", "Side", "Top", "Reset"]) {
-      await player.getByRole("button", { name: camera }).click();
+    for (const camera of ["Front", "Side", "Top", "Close", "Reset"]) {
+      await player.getByRole("button", { name: camera, exact: true }).click();
       await page.waitForTimeout(1200);
       await player.screenshot({ path: join(shots, `player-${i + 1}-${camera.toLowerCase()}.png`) });
     }
@@ -129,6 +129,7 @@ try {
   }
   await page.evaluate(() => { document.querySelector("details")?.setAttribute("open", ""); });
 
+  await page.addStyleTag({ content: "nav { position: static !important; }" }).catch(() => {});
   for (const section of await page.locator("section").all()) {
     await section.scrollIntoViewIfNeeded();
     await page.waitForTimeout(500);

@@ -16,7 +16,9 @@ const [GREEN, BLUE] = FINGERS.map(rgb);
 export function blend(base, first, second) {
   const strength = (1 - FLOOR) * Math.max(first, second) ** GAMMA;
   const sum = Math.max(first + second, 1e-6);
-  return base.map((value, i) => value * (1 - strength) + strength * ((GREEN[i] * first + BLUE[i] * second) / sum));
+  const grey = 0.3 * base[0] + 0.59 * base[1] + 0.11 * base[2];
+  const calm = 0.8 * Math.min(1, 2.5 * strength);
+  return base.map((value) => value + (grey - value) * calm).map((value, i) => value * (1 - strength) + strength * ((GREEN[i] * first + BLUE[i] * second) / sum));
 }
 
 const VERTEX = `
@@ -28,10 +30,12 @@ void main() {
   float top = max(first, second);
   float strength = ${(1 - FLOOR).toFixed(3)} * pow(top, ${GAMMA.toFixed(3)});
   vec3 hue = (vec3(${GREEN.join(", ")}) * first + vec3(${BLUE.join(", ")}) * second) / max(first + second, 1e-6);
-  shade = mix(tint, hue, strength);
+  // A tinted point first loses its own colour, so that green on yellow does not turn to mud.
+  vec3 plain = mix(tint, vec3(dot(tint, vec3(0.3, 0.59, 0.11))), 0.8 * min(1.0, 2.5 * strength));
+  shade = mix(plain, hue, strength);
   fade = quiet * smoothstep(0.55, 1.0, distance(position, middle) / reach);
   gl_Position = projectionMatrix * seen;
-  gl_PointSize = max(1.5, size * (1.0 + 0.45 * strength) * height * projectionMatrix[1][1] * 0.5 / gl_Position.w);
+  gl_PointSize = max(1.5, size * (quiet > 0.995 ? 0.65 : 1.0) * (1.0 + 0.45 * strength) * height * projectionMatrix[1][1] * 0.5 / gl_Position.w);
 }`;
 
 const FRAGMENT = `
@@ -59,11 +63,11 @@ export function cloudFrame(points, kinds) {
   if (!chosen.length) return { middle, radius: 0.2, spacing: 0.01 };
   const axis = (k) => {
     const values = chosen.map((i) => points[3 * i + k]).sort((a, b) => a - b);
-    return (values[Math.floor(0.02 * values.length)] + values[Math.floor(0.98 * values.length)]) / 2;
+    return (values[Math.floor(0.004 * values.length)] + values[Math.floor(0.996 * values.length)]) / 2;
   };
   middle.set(axis(0), axis(1), axis(2));
   const distances = chosen.map((i) => Math.hypot(points[3 * i] - middle.x, points[3 * i + 1] - middle.y, points[3 * i + 2] - middle.z)).sort((a, b) => a - b);
-  const radius = Math.max(0.02, distances[Math.floor(0.97 * distances.length)]);
+  const radius = Math.max(0.02, distances[Math.floor(0.995 * distances.length)]);
   const nearest = chosen.filter((_, n) => n % Math.ceil(chosen.length / 60) === 0).map((i) => {
     let best = Infinity;
     for (const j of chosen) {
@@ -111,7 +115,7 @@ export function cloudBase(points, colors, kinds) {
   const quiet = new Float32Array(n);
   for (let i = 0; i < n; i++) {
     const table = kinds[i] === TABLE;
-    quiet[i] = table ? 1 : 0;
+    quiet[i] = table ? 1 : kinds[i] === PART ? 0 : 0.99;
     for (let k = 0; k < 3; k++) {
       const value = points[3 * i + k];
       positions[3 * i + k] = Number.isFinite(value) ? value : 0;
@@ -136,14 +140,14 @@ export function mapScene(base, frame, first, second) {
   }
   const material = new ShaderMaterial({
     vertexShader: VERTEX, fragmentShader: FRAGMENT,
-    uniforms: { height: { value: 1 }, size: { value: 2.1 * frame.spacing }, middle: { value: frame.middle }, reach: { value: 2.6 * frame.radius } },
+    uniforms: { height: { value: 1 }, size: { value: 2.5 * frame.spacing }, middle: { value: frame.middle }, reach: { value: 2.6 * frame.radius } },
   });
   const cloud = new Points(geometry, material);
   cloud.frustumCulled = false;
   const scene = new Scene();
   scene.add(cloud);
   const balls = new Group();
-  peaks.forEach(({ point }, finger) => { if (point) balls.add(ball(FINGERS[finger], 0.042 * frame.radius, point)); });
+  peaks.forEach(({ point }, finger) => { if (point) balls.add(ball(FINGERS[finger], 0.034 * frame.radius, point)); });
   scene.add(balls);
   return { scene, material, peaks, balls };
 }

@@ -27,9 +27,17 @@ export function svg(tag, attributes = {}, ...children) {
   return fill(document.createElementNS(SVG, tag), attributes, children);
 }
 
-/** A figure with its caption: a number in bold, then words. */
+const numbered = new Map();
+
+/** The next number of its kind, as in "Figure 3". Figures count in the order in which they are made. */
+export function numberOf(kind) {
+  numbered.set(kind, (numbered.get(kind) ?? 0) + 1);
+  return `${kind} ${numbered.get(kind)}`;
+}
+
+/** A figure with its caption: its name in bold, then words. */
 export function figure(name, caption, ...children) {
-  return el("figure", {}, ...children, el("figcaption", {}, name && el("b", {}, name, "  "), caption));
+  return el("figure", {}, ...children, el("figcaption", {}, name && el("b", {}, `${name}. `), caption));
 }
 
 /** A key to colours: [name, colour] pairs. */

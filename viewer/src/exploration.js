@@ -1,6 +1,6 @@
 // How the label set grew: acceptance by round, totals, failures by stage.
 
-import { el, figure } from "./dom.js";
+import { el, figure, numberOf } from "./dom.js";
 import { count, percent, stageName } from "./format.js";
 import { lineChart } from "./chart.js";
 import { STAGES, SUCCESS } from "./palette.js";
@@ -24,7 +24,7 @@ export function explorationSection(summary) {
       el("th", { scope: "row" }, el("span", { class: "swatch", style: { "--ink": color }, "aria-hidden": "true" }), name),
       el("td", { class: "number" }, count(n)), el("td", { class: "number quiet" }, percent(n / trials)))))));
   const charts = rounds.length > 1 && el("div", { class: "panel" }, el("h3", {}, "Acceptance by round"), acceptance(rounds));
-  return [figure("Figure 5", "Exploration from the demonstrated contact tuples: contacts near those that worked are tried in rounds, " +
+  return [figure(numberOf("Figure"), "Exploration from the demonstrated contact tuples: contacts near those that worked are tried in rounds, " +
     "and each round draws from the successes of the rounds before.", el("div", { class: "charts halves" }, left, charts))];
 }
 

@@ -2,7 +2,7 @@
 
 import { PerspectiveCamera } from "three";
 import { unpackBytes, unpackFloats } from "./data.js";
-import { el, figure, svg } from "./dom.js";
+import { el, figure, numberOf, svg } from "./dom.js";
 import { isNumber } from "./format.js";
 import { blend, cloudBase, cloudFrame, mapScene } from "./cloud.js";
 import { Orbit } from "./orbit.js";
@@ -14,15 +14,14 @@ const GREY = [0.82, 0.82, 0.8];
 
 /** The contact-map section's content; nothing without maps. */
 export function mapsSection(figures, stage) {
-  return figures.filter((entry) => entry.maps?.length).map((entry, index) => mapsFigure(entry, index, stage));
+  return figures.filter((entry) => entry.maps?.length).map((entry) => mapsFigure(entry, numberOf("Figure"), stage));
 }
 
 const caption = (entry) => `${entry.caption ? `${entry.caption} ` : ""}Contact maps of one scene for ${entry.maps.length} latent codes: finger 1 in green, ` +
   "finger 2 in blue, shaded by probability relative to each finger's maximum; a ball marks the most probable point. " +
   "The cloud keeps its own colours where the probability is low. All views share one camera.";
 
-function mapsFigure(entry, index, stage) {
-  const name = `Figure 2${index ? String.fromCharCode(97 + index) : ""}`;
+function mapsFigure(entry, name, stage) {
   const title = entry.title && el("h3", {}, entry.title);
   if (!stage) return figure(name, caption(entry), title, el("p", { class: "notice" }, NO_WEBGL));
 
@@ -31,7 +30,7 @@ function mapsFigure(entry, index, stage) {
   const frame = cloudFrame(points, kinds);
   const base = cloudBase(points, unpackBytes(entry.colors), kinds);
   const maps = entry.maps.map((map) => ({ latent: map.latent ?? [], ...mapScene(base, frame, unpackFloats(map.finger1), unpackFloats(map.finger2)) }));
-  const distance = (1.12 * frame.radius) / Math.sin((FIELD * Math.PI) / 360);
+  const distance = (1.04 * frame.radius) / Math.sin((FIELD * Math.PI) / 360);
   const orbit = new Orbit({ target: frame.middle, distance, azimuth: -Math.PI / 3, elevation: 0.82 });
   const views = [];
   orbit.onChange(() => views.forEach((view) => view.invalidate()));
@@ -86,7 +85,7 @@ function mapsFigure(entry, index, stage) {
       el("button", { type: "button", onclick: () => orbit.reset() }, "Reset view")),
     el("p", { class: "hint" }, "Drag to turn, shift-drag to move, scroll to zoom once focused, arrow keys to turn, + and − to zoom, 0 to reset."));
   return figure(name, caption(entry), title, el("div", { class: "five", style: { "--views": String(Math.min(5, maps.length)) } }, panels.map(({ node }) => node)),
-    el("div", { class: "focus" }, large, aside));
+    el("div", { class: "focus" }, el("div", { class: "large" }, large), aside));
 }
 
 const KEYS = "Arrow keys turn, plus and minus zoom, 0 resets.";
@@ -110,12 +109,12 @@ function mapFacts({ latent, peaks }, title) {
   const top = (peak) => (peak.most ? peak.most.toPrecision(2) : "–");
   return [
     el("h4", {}, title),
-    latent.length > 0 && el("div", { class: "latent-large" }, latentBars(latent, 260, 56),
+    latent.length > 0 && el("div", { class: "latent-large" }, latentBars(latent, 240, 56),
       el("span", { class: "quiet" }, `latent code, ${latent.length} number${latent.length === 1 ? "" : "s"}, ±3`)),
     el("dl", { class: "pairs" },
-      el("dt", {}, "Distance between the two peaks"), el("dd", {}, span),
-      el("dt", {}, el("span", { class: "dot", style: { "--ink": FINGERS[0] } }), "Peak probability, finger 1"), el("dd", {}, top(one)),
-      el("dt", {}, el("span", { class: "dot", style: { "--ink": FINGERS[1] } }), "Peak probability, finger 2"), el("dd", {}, top(two))),
+      el("dt", {}, "Distance between the peaks"), el("dd", {}, span),
+      el("dt", {}, el("span", { class: "dot", style: { "--ink": FINGERS[0] } }), "Highest probability, finger 1"), el("dd", {}, top(one)),
+      el("dt", {}, el("span", { class: "dot", style: { "--ink": FINGERS[1] } }), "Highest probability, finger 2"), el("dd", {}, top(two))),
   ].filter(Boolean);
 }
 

@@ -1,6 +1,6 @@
 // Success by cell with Wilson intervals, failures by stage, and success over the threshold's scale.
 
-import { el, figure, legend } from "./dom.js";
+import { el, figure, numberOf } from "./dom.js";
 import { count, isNumber, methodName, objectName, orderName, percent, robotNames, stageName } from "./format.js";
 import { lineChart } from "./chart.js";
 import { methodColor, STAGES, SUCCESS } from "./palette.js";
@@ -63,7 +63,7 @@ function successFigure(cells, methods) {
       el("td", { class: "number strong" }, percent(cell.rate)),
       el("td", { class: "plot" }, intervalBar(cell, methods)),
       el("td", { class: "number quiet" }, `${percent(cell.wilson95?.[0])} – ${percent(cell.wilson95?.[1])}`))));
-  return figure("Table 1", "Share of trials that met the goal, by grasp order and method. Line: Wilson score interval at 95 %. " +
+  return figure(numberOf("Table"), "Share of trials that met the goal, by grasp order and method. Line: Wilson score interval at 95 %. " +
     "Methods within one order are tried on the same scenes and goals.", el("div", { class: "scroll" }, table));
 }
 
@@ -72,10 +72,9 @@ function failureFigure(cells, methods) {
   const segments = (cell) => [["success", cell.successes, SUCCESS], ...STAGES.map(([stage, color]) => [stageName(stage), failures(cell)[stage] ?? 0, color])];
   const table = el("table", { class: "failures" },
     el("thead", {}, el("tr", {}, el("th", { scope: "col" }, "Grasp order"), el("th", { scope: "col" }, "Method"),
-      el("th", { scope: "col", class: "plot" }, "Share of trials"),
-      STAGES.map(([stage, color]) => el("th", { scope: "col", class: "number stage", style: { "--ink": color } },
-        el("span", { class: "swatch", style: { "--ink": color }, "aria-hidden": "true" }), stageName(stage))),
-      el("th", { scope: "col", class: "number" }, "all"))),
+      el("th", { scope: "col", class: "plot" }, el("span", { class: "swatch", style: { "--ink": SUCCESS }, "aria-hidden": "true" }), "success and failures, share of trials"),
+      STAGES.map(([stage, color]) => el("th", { scope: "col", class: "number stage" }, el("span", { class: "swatch", style: { "--ink": color }, "aria-hidden": "true" }), stageName(stage))),
+      el("th", { scope: "col", class: "number" }, "all failed"))),
     groupedRows(cells, 4 + STAGES.length, (cell, before) => el("tr", { class: before && before.order !== cell.order ? "break" : null },
       cellNames(cell, before, methods),
       el("td", { class: "plot" }, stackedBar(segments(cell), cell.trials)),
@@ -84,8 +83,7 @@ function failureFigure(cells, methods) {
         return el("td", { class: n ? "number" : "number zero" }, count(n));
       }),
       el("td", { class: "number strong" }, count(Math.max(0, cell.trials - cell.successes))))));
-  return figure("Table 2", "Failures by the first stage that failed. A bar is all trials of its row; the pale part are the successes.",
-    legend([["success", SUCCESS], ...STAGES.map(([stage, color]) => [stageName(stage), color])]),
+  return figure(numberOf("Table"), "Failed trials by the first stage that failed. A bar stands for all trials of its row; its pale part is the successes.",
     el("div", { class: "scroll" }, table));
 }
 
@@ -101,7 +99,7 @@ function thresholdFigure(cells, methods) {
     dash: dashes[orders.indexOf(cell.order) % dashes.length],
     points: cell.threshold_curve.map(({ scale, rate }) => [scale, isNumber(rate) ? 100 * rate : null]),
   }));
-  return figure("Figure 1", "Success rate if all thresholds (position, angle, joint) are scaled by the factor on the horizontal axis. " +
+  return figure(numberOf("Figure"), "Success rate if all thresholds (position, angle, joint) are scaled by the factor on the horizontal axis. " +
     "The factor 1 is the table above; no single threshold decides the comparison.",
     lineChart({ series, xLabel: "threshold scale factor", yLabel: "success rate (%)", yRange: [0, 100], height: 300, mark: 1, name: "Success against threshold" }));
 }

@@ -1,7 +1,7 @@
 // Playable rollouts: the scene, play and scrub controls, stages on the time line, camera buttons.
 
 import { PerspectiveCamera } from "three";
-import { el, figure } from "./dom.js";
+import { el, figure, numberOf } from "./dom.js";
 import { seconds } from "./format.js";
 import { Orbit } from "./orbit.js";
 import { RolloutScene } from "./scene.js";
@@ -12,8 +12,7 @@ const SPEEDS = [0.25, 0.5, 1, 2, 4];
 
 /** The rollout section's content; nothing without frames. */
 export function rolloutsSection(rollouts, stage) {
-  return rollouts.filter(({ rollout }) => rollout?.bodies?.length && rollout.poses).map((entry, index, all) =>
-    player(entry, `Figure 3${all.length > 1 ? String.fromCharCode(97 + index) : ""}`, stage));
+  return rollouts.filter(({ rollout }) => rollout?.bodies?.length && rollout.poses).map((entry) => player(entry, numberOf("Figure"), stage));
 }
 
 function outcomeBadge(outcome) {
@@ -30,8 +29,8 @@ function player({ title, caption, rollout }, name, stage) {
   const world = new RolloutScene(rollout);
   const { duration } = world.motion;
   const camera = new PerspectiveCamera(FIELD, 1, 0.01, 50);
-  const { target, radius, front } = world.frame;
-  const distance = (0.92 * radius) / Math.sin((FIELD * Math.PI) / 360);
+  const { target, radius, front, work } = world.frame;
+  const distance = (0.86 * radius) / Math.sin((FIELD * Math.PI) / 360);
   const orbit = new Orbit({ target, distance, azimuth: front + 0.5, elevation: 0.5 });
   const canvas = el("canvas", { class: "view wide", "aria-label": `${title || "Rollout"}. Space plays and pauses. Arrow keys turn, plus and minus zoom, 0 resets.` });
   orbit.attach(canvas);
@@ -80,10 +79,11 @@ function player({ title, caption, rollout }, name, stage) {
   }
 
   const fly = (azimuth, elevation) => orbit.fly({ azimuth, elevation, distance, target: target.clone() });
+  const near = () => orbit.fly({ azimuth: front + 0.25, elevation: 0.42, distance: (1.5 * work.radius) / Math.sin((FIELD * Math.PI) / 360), target: work.middle.clone() });
   const camButton = (label, action) => el("button", { type: "button", onclick: action }, label);
   const cameras = el("div", { class: "cameras", role: "group", "aria-label": "Camera" },
     camButton("Front", () => fly(front, 0.18)), camButton("Side", () => fly(front + Math.PI / 2, 0.18)),
-    camButton("Top", () => fly(front, Math.PI / 2)), camButton("Reset", () => orbit.reset()));
+    camButton("Top", () => fly(front, Math.PI / 2)), camButton("Close", near), camButton("Reset", () => orbit.reset()));
   const speeds = el("select", { "aria-label": "Speed", onchange: () => { speed = Number(speeds.value); } },
     SPEEDS.map((value) => el("option", { value, selected: value === 1 }, `${value}×`)));
   const box = (label, change) => el("label", {}, el("input", { type: "checkbox", checked: true, onchange: (event) => { change(event.target.checked); view.invalidate(); } }), ` ${label}`);

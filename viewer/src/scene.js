@@ -44,7 +44,7 @@ export class RolloutScene {
     const ghost = new Group();
     const goal = unpackFloats(this.rollout.goal);
     const hidden = new MeshBasicMaterial({ colorWrite: false, transparent: true });
-    const green = new MeshStandardMaterial({ color: GOAL, emissive: new Color(GOAL), emissiveIntensity: 0.25, transparent: true, opacity: 0.42, depthFunc: LessEqualDepth, roughness: 0.8 });
+    const green = new MeshStandardMaterial({ color: GOAL, emissive: new Color(GOAL), emissiveIntensity: 0.12, transparent: true, opacity: 0.58, depthFunc: LessEqualDepth, roughness: 0.8 });
     const parts = this.rollout.bodies.filter(({ kind }) => kind === "part");
     parts.forEach(({ solids }, index) => {
       const group = new Group();
@@ -90,27 +90,31 @@ export class RolloutScene {
     this.ghost.children.forEach((part) => work.expandByPoint(part.position));
     if (box.isEmpty()) box.set(new Vector3(-0.5, -0.5, 0), new Vector3(0.5, 0.5, 0.5));
     const size = box.getSize(new Vector3());
-    const target = (work.isEmpty() ? box : work).getCenter(new Vector3());
-    target.z = 0.55 * target.z + 0.45 * (box.min.z + 0.4 * size.z);
-    return { target, radius: Math.max(0.15, 0.5 * size.length()), front: frontAzimuth([...bases.values()]) };
+    if (work.isEmpty()) work.copy(box);
+    const target = work.getCenter(new Vector3());
+    target.z = 0.6 * target.z + 0.4 * (box.min.z + 0.5 * size.z);
+    const near = { middle: work.getCenter(new Vector3()), radius: Math.max(0.14, 0.5 * work.getSize(new Vector3()).length()) };
+    return { target, radius: Math.max(0.15, 0.5 * size.length()), front: frontAzimuth([...bases.values()], target), work: near };
   }
 
   light() {
     const { target, radius } = this.frame;
-    const key = new DirectionalLight(0xfff6ea, 2.1);
+    const key = new DirectionalLight(0xfff8ee, 2.3);
     key.position.copy(target).add(new Vector3(0.5, -0.9, 2.0).multiplyScalar(radius * 1.6));
     key.target.position.copy(target);
     key.castShadow = true;
     key.shadow.mapSize.set(2048, 2048);
     key.shadow.radius = 3;
-    key.shadow.intensity = 0.6;
+    key.shadow.intensity = 0.48;
+    key.shadow.autoUpdate = false;
+    this.shadow = key.shadow;
     key.shadow.bias = -0.0004;
     key.shadow.normalBias = 0.004;
     Object.assign(key.shadow.camera, { left: -1.3 * radius, right: 1.3 * radius, top: 1.3 * radius, bottom: -1.3 * radius, near: 0.1 * radius, far: 6 * radius });
     const fill = new DirectionalLight(0xdfe9ff, 0.6);
     fill.position.copy(target).add(new Vector3(-1, 0.8, 0.7));
     fill.target.position.copy(target);
-    this.scene.add(key, key.target, fill, fill.target, new HemisphereLight(0xffffff, 0xcfc8bb, 1.25), new AmbientLight(0xffffff, 0.25));
+    this.scene.add(key, key.target, fill, fill.target, new HemisphereLight(0xffffff, 0xd9d4ca, 1.7), new AmbientLight(0xffffff, 0.35));
   }
 
   /** Balls where fingers were asked to touch; each rides on the body it lies on. Shown from the stage before the grasp on. */
@@ -156,13 +160,15 @@ export class RolloutScene {
 
   /** Moves everything to `time` (s). */
   place(time) {
+    if (this.shadow && time !== this.time) this.shadow.needsUpdate = true;
+    this.time = time;
     this.bodies.forEach((group, i) => this.motion.place(i, time, group));
     for (const { ball, shown } of this.contacts ?? []) ball.visible = this.contactsOn !== false && time >= shown - 1e-9;
   }
 }
 
 /** The horizontal direction to look from so that the arms stand side by side. */
-function frontAzimuth(bases) {
+function frontAzimuth(bases, target) {
   let far = null;
   for (const a of bases) {
     for (const b of bases) {
@@ -170,5 +176,8 @@ function frontAzimuth(bases) {
       if (gap > (far?.gap ?? 0.05)) far = { gap, angle: Math.atan2(b.y - a.y, b.x - a.x) };
     }
   }
-  return far ? far.angle - Math.PI / 2 : 0;
+  const front = far ? far.angle - Math.PI / 2 : 0;
+  // The work stands between the reader and the arms, not behind them.
+  const behind = bases.reduce((sum, base) => sum + (target.x - base.x) * Math.cos(front) + (target.y - base.y) * Math.sin(front), 0);
+  return behind < -0.2 * bases.length ? front + Math.PI : front;
 }

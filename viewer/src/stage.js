@@ -73,7 +73,7 @@ class Stage {
 
   frame(now) {
     this.pending = 0;
-    const elapsed = Math.min(0.1, (now - (this.before ?? now)) / 1000);
+    const elapsed = Math.min(0.3, (now - (this.before ?? now)) / 1000);
     let more = false;
     for (const view of this.views) {
       if (!view.visible) continue;

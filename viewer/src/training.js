@@ -1,6 +1,6 @@
 // Loss curves, one row of charts per model.
 
-import { el, figure } from "./dom.js";
+import { el, figure, numberOf } from "./dom.js";
 import { isNumber, methodName } from "./format.js";
 import { lineChart } from "./chart.js";
 
@@ -17,7 +17,7 @@ export function trainingSection(models) {
   const trained = models.filter((model) => model.epochs?.length);
   if (!trained.length) return [];
   const charts = trained.flatMap(modelCharts);
-  return [figure("Figure 4", "Loss over training epochs. The validation scenes are never trained on. " +
+  return [figure(numberOf("Figure"), "Loss over training epochs. The validation scenes are never trained on. " +
     "A model without a latent code has no KL divergence. Point at a curve, or focus it and use the arrow keys, to read values.",
     el("div", { class: "charts" }, charts))];
 }
