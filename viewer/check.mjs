@@ -1,5 +1,5 @@
 // Opens a report in headless Chromium, tries what a reader would, and saves screenshots.
-// Usage: node check.mjs REPORT.html SCREENSHOT_DIR [--width=1280]. CHROMIUM names another browser than /usr/bin/chromium.
+// Usage: node check.mjs REPORT.html SCREENSHOT_DIR [--width=1280] [--without-webgl]. CHROMIUM names another browser than /usr/bin/chromium.
 
 import { mkdirSync, mkdtempSync, rmSync } from "node:fs";
 import { tmpdir } from "node:os";
@@ -8,9 +8,10 @@ import { pathToFileURL } from "node:url";
 import { chromium } from "playwright-core";
 
 const [report, shots] = process.argv.slice(2);
+const withoutWebgl = process.argv.includes("--without-webgl");
 const width = Number(process.argv.find((arg) => arg.startsWith("--width="))?.slice(8) ?? 1280);
 if (!report || !shots) {
-  console.error("usage: node check.mjs REPORT.html SCREENSHOT_DIR [--width=1280]");
+  console.error("usage: node check.mjs REPORT.html SCREENSHOT_DIR [--width=1280] [--without-webgl]");
   process.exit(2);
 }
 mkdirSync(shots, { recursive: true });
@@ -27,7 +28,7 @@ const browser = await chromium.launchPersistentContext(profile, {
   headless: true,
   viewport: { width, height: 900 },
   args: ["--no-sandbox", "--disable-quic", "--no-first-run", "--disable-background-networking", "--disable-component-update", "--disable-sync",
-    "--use-angle=swiftshader", "--enable-unsafe-swiftshader"],
+    ...(withoutWebgl ? ["--disable-3d-apis"] : ["--use-angle=swiftshader", "--enable-unsafe-swiftshader"])],
 });
 
 /** Share of a canvas that differs from its own corner, and the number of distinct colours. */
@@ -56,6 +57,7 @@ try {
   const requests = [];
   page.on("console", (message) => { if (["error", "warning"].includes(message.type()) && !/GPU stall|swiftshader/i.test(message.text())) problems.push(message.text()); });
   page.on("pageerror", (error) => problems.push(String(error)));
+  page.on("dialog", async (dialog) => { problems.push(`dialog: ${dialog.message()}`); await dialog.dismiss(); });
   page.on("request", (request) => { if (!/^(file|data|blob):/.test(request.url())) requests.push(request.url()); });
   await page.goto(pathToFileURL(resolve(report)).href);
   await page.waitForSelector("h1");
@@ -65,6 +67,11 @@ try {
   check("the page is no wider than the window", overflow <= 0, `${overflow} px over`);
 
   const views = page.locator("canvas.view");
+  if (withoutWebgl) {
+    const notices = await page.locator(".notice").allTextContents();
+    check("a line says that WebGL is missing", notices.length > 0 && notices.every((text) => text.includes("WebGL")));
+    check("no blank canvas stands in for a view", await views.count() === 0);
+  }
   for (let i = 0; i < await views.count(); i++) {
     await settle(views.nth(i));
     const { filled, colors } = await picture(views.nth(i));
@@ -95,6 +102,8 @@ try {
     await player.locator("canvas").scrollIntoViewIfNeeded();
     await player.locator("canvas").focus();
     const start = await time();
+    const painted = () => player.locator("canvas").evaluate((node) => Number(node.dataset.painted));
+    const drawn = await painted();
     await page.keyboard.press(" ");
     await page.waitForTimeout(1500);
     const later = await time();
@@ -102,7 +111,7 @@ try {
     await page.waitForTimeout(200);
     const paused = await time();
     await page.waitForTimeout(400);
-    check(`player ${i + 1}: space plays`, later > start, `${start.toFixed(2)} → ${later.toFixed(2)} s`);
+    check(`player ${i + 1}: space plays`, later > start, `${start.toFixed(2)} → ${later.toFixed(2)} s, ${((await painted() - drawn) / 1.5).toFixed(0)} pictures/s`);
     check(`player ${i + 1}: space pauses`, await time() === paused);
     await slider.evaluate((node, value) => { node.value = value; node.dispatchEvent(new Event("input", { bubbles: true })); }, String(end * 0.62));
     await page.waitForTimeout(600);
@@ -112,6 +121,14 @@ try {
       await page.waitForTimeout(1200);
       await player.screenshot({ path: join(shots, `player-${i + 1}-${camera.toLowerCase()}.png`) });
     }
+    const solid = player.getByLabel("Solid arms");
+    await solid.uncheck();
+    await player.getByRole("button", { name: "Close", exact: true }).click();
+    await page.waitForTimeout(1200);
+    await player.screenshot({ path: join(shots, `player-${i + 1}-glass.png`) });
+    await solid.check();
+    await player.getByRole("button", { name: "Reset", exact: true }).click();
+    await page.waitForTimeout(1200);
     for (const [name, share] of [["start", 0], ["end", 1]]) {
       await slider.evaluate((node, value) => { node.value = value; node.dispatchEvent(new Event("input", { bubbles: true })); }, String(end * share));
       await page.waitForTimeout(600);

@@ -36,15 +36,17 @@ function cellNames(cell, before, methods) {
   ];
 }
 
+const interval = (bounds) => (bounds?.every(isNumber) ? `${percent(bounds[0])} – ${percent(bounds[1])}` : "–");
+
 function intervalBar(cell, methods) {
   const [low, high] = (cell.wilson95 ?? [0, 1]).map(clamp);
   const at = (value) => `${100 * value}%`;
   return el("div", { class: "interval", style: { "--ink": methodColor(cell.method, methods) }, role: "img",
     "aria-label": `${percent(cell.rate)}, 95 % interval ${percent(low)} to ${percent(high)}` },
     TICKS.map((tick) => el("i", { class: "grid", style: { left: at(tick) } })),
-    el("i", { class: "fill", style: { width: at(clamp(cell.rate)) } }),
+    isNumber(cell.rate) && [el("i", { class: "fill", style: { width: at(clamp(cell.rate)) } }),
     el("i", { class: "whisker", style: { left: at(low), width: at(Math.max(0, high - low)) } }),
-    el("i", { class: "mean", style: { left: at(clamp(cell.rate)) } }));
+    el("i", { class: "mean", style: { left: at(clamp(cell.rate)) } })]);
 }
 
 function successFigure(cells, methods) {
@@ -62,7 +64,7 @@ function successFigure(cells, methods) {
       el("td", { class: "number" }, count(cell.trials)), el("td", { class: "number" }, count(cell.successes)),
       el("td", { class: "number strong" }, percent(cell.rate)),
       el("td", { class: "plot" }, intervalBar(cell, methods)),
-      el("td", { class: "number quiet" }, `${percent(cell.wilson95?.[0])} – ${percent(cell.wilson95?.[1])}`))));
+      el("td", { class: "number quiet" }, interval(cell.wilson95)))));
   return figure(numberOf("Table"), "Share of trials that met the goal, by grasp order and method. Line: Wilson score interval at 95 %. " +
     "Methods within one order are tried on the same scenes and goals.", el("div", { class: "scroll" }, table));
 }

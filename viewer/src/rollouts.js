@@ -79,7 +79,7 @@ function player({ title, caption, rollout }, name, stage) {
   }
 
   const fly = (azimuth, elevation) => orbit.fly({ azimuth, elevation, distance, target: target.clone() });
-  const near = () => orbit.fly({ azimuth: front + 0.25, elevation: 0.42, distance: (1.5 * work.radius) / Math.sin((FIELD * Math.PI) / 360), target: work.middle.clone() });
+  const near = () => orbit.fly({ azimuth: front + 0.25, elevation: 0.24, distance: (1.5 * work.radius) / Math.sin((FIELD * Math.PI) / 360), target: work.middle.clone() });
   const camButton = (label, action) => el("button", { type: "button", onclick: action }, label);
   const cameras = el("div", { class: "cameras", role: "group", "aria-label": "Camera" },
     camButton("Front", () => fly(front, 0.18)), camButton("Side", () => fly(front + Math.PI / 2, 0.18)),
@@ -88,7 +88,7 @@ function player({ title, caption, rollout }, name, stage) {
     SPEEDS.map((value) => el("option", { value, selected: value === 1 }, `${value}×`)));
   const box = (label, change) => el("label", {}, el("input", { type: "checkbox", checked: true, onchange: (event) => { change(event.target.checked); view.invalidate(); } }), ` ${label}`);
   const controls = el("div", { class: "controls" }, play, speeds, clock, el("span", { class: "spacer" }),
-    box("Goal", (on) => { world.ghost.visible = on; }), box("Contacts", (on) => { world.contactsOn = on; }));
+    box("Solid arms", (on) => world.setArms(on)), box("Goal", (on) => { world.ghost.visible = on; }), box("Contacts", (on) => { world.contactsOn = on; }));
 
   const node = el("div", { class: "player" },
     el("div", { class: "screen" }, canvas, stageLabel, cameras),

@@ -16,6 +16,7 @@ export class RolloutScene {
     this.rollout = rollout;
     this.motion = new Motion(rollout);
     this.scene = new Scene();
+    this.armMaterials = [];
     this.bodies = rollout.bodies.map((body) => this.body(body));
     this.ghost = this.makeGhost();
     this.place(0);
@@ -29,6 +30,7 @@ export class RolloutScene {
     const group = new Group();
     for (const { shape, pose, color } of solids) {
       const material = new MeshStandardMaterial({ color: new Color().setRGB(...color, "srgb"), roughness: kind === "table" ? 0.95 : 0.5, metalness: 0.02 });
+      if (kind === "arm") this.armMaterials.push(material);
       const mesh = new Mesh(solidGeometry(shape), material);
       placeSolid(mesh, pose);
       mesh.castShadow = kind !== "table";
@@ -108,8 +110,8 @@ export class RolloutScene {
     key.shadow.intensity = 0.48;
     key.shadow.autoUpdate = false;
     this.shadow = key.shadow;
-    key.shadow.bias = -0.0004;
-    key.shadow.normalBias = 0.004;
+    key.shadow.bias = -0.0008;
+    key.shadow.normalBias = 0.012;
     Object.assign(key.shadow.camera, { left: -1.3 * radius, right: 1.3 * radius, top: 1.3 * radius, bottom: -1.3 * radius, near: 0.1 * radius, far: 6 * radius });
     const fill = new DirectionalLight(0xdfe9ff, 0.6);
     fill.position.copy(target).add(new Vector3(-1, 0.8, 0.7));
@@ -156,6 +158,14 @@ export class RolloutScene {
       });
     });
     return best;
+  }
+
+  /** Solid arms, or arms like glass that do not hide the parts. */
+  setArms(solid) {
+    for (const material of this.armMaterials) {
+      Object.assign(material, { transparent: !solid, opacity: solid ? 1 : 0.16, depthWrite: solid });
+      material.needsUpdate = true;
+    }
   }
 
   /** Moves everything to `time` (s). */

@@ -19,6 +19,7 @@ class View {
     this.visible = false;
     this.dirty = true;
     this.running = null;
+    this.quality = 1;
   }
 
   /** Asks for one new picture. */
@@ -80,6 +81,7 @@ class Stage {
       if (view.running) {
         if (view.running(elapsed)) more = true;
         else view.running = null;
+        this.adapt(view, elapsed);
         view.dirty = true;
       }
       if (view.dirty) this.paint(view);
@@ -88,9 +90,16 @@ class Stage {
     if (more) this.wake();
   }
 
+  /** A machine without a graphics card draws moving pictures coarser; a still one is always sharp. */
+  adapt(view, elapsed) {
+    if (!view.running) view.quality = 1;
+    else if (elapsed > 0.045) view.quality = Math.max(0.5, view.quality - 0.1);
+    else if (elapsed > 0 && elapsed < 0.018) view.quality = Math.min(1, view.quality + 0.01);
+  }
+
   paint(view) {
     const { canvas, context } = view;
-    const ratio = Math.min(2, window.devicePixelRatio || 1);
+    const ratio = view.quality * Math.min(2, window.devicePixelRatio || 1);
     const width = Math.round(canvas.clientWidth * ratio);
     const height = Math.round(canvas.clientHeight * ratio);
     if (!width || !height) return;

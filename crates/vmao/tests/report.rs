@@ -2,7 +2,7 @@
 
 mod synthetic;
 
-use vmao::report::{ReportData, TrainingCurve, TrainingEpoch, render};
+use vmao::report::{Cell, ReportData, TrainingCurve, TrainingEpoch, render};
 
 /// The JSON that a page carries, read back the way a browser finds it.
 #[track_caller]
@@ -51,6 +51,7 @@ fn hostile_text_stays_text() {
     data.rollouts[0].rollout.outcome = hostile.into();
     data.provenance.config = hostile.into();
     let page = render(&data);
+    std::fs::write(std::path::Path::new(env!("CARGO_TARGET_TMPDIR")).join("report-hostile.html"), &page).unwrap();
     let back = carried(&page);
     for text in [&back["title"], &back["summary"], &back["cells"][0]["object"], &back["provenance"]["config"]] {
         assert_eq!(text, hostile);
@@ -59,6 +60,20 @@ fn hostile_text_stays_text() {
     for tag in ["<script", "</script", "<!--"] {
         assert_eq!(page.matches(tag).count(), plain.matches(tag).count(), "{tag}");
     }
+}
+
+#[test]
+fn a_cell_of_results_json_is_a_row_of_the_table() {
+    let cell: Cell = serde_json::from_str(
+        r#"{"object": "three-sticks", "robots": ["sawyer", "sawyer", "sawyer"], "order": "sequential-parallel", "method": "vmao",
+            "trials": 500, "successes": 430, "rate": 0.86, "wilson95": [0.827, 0.888],
+            "failures": {"no-contact": 40, "unreachable": 0, "no-plan": 0, "collision": 0, "slip": 30, "threshold": 0, "timeout": 0}}"#,
+    )
+    .unwrap();
+    assert_eq!(cell.failures[&vmao_core::outcome::FailureStage::Slip], 30);
+    let back = carried(&render(&ReportData { cells: vec![cell], ..ReportData::default() }));
+    assert_eq!(back["cells"][0]["failures"]["no-contact"], 40);
+    assert_eq!(back["cells"][0]["order"], "sequential-parallel");
 }
 
 #[test]

@@ -1,7 +1,7 @@
 //! What a report holds. Every section may be empty; numbers that are not finite arrive in the page as gaps.
 
 use super::pack;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use vmao_core::{observation::PointLabel, order::GraspOrder, outcome::FailureStage, rollout::Rollout};
 
@@ -27,7 +27,7 @@ pub struct ReportData {
 }
 
 /// One row of the success table: a cell of `results.json`.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Cell {
     /// Catalogue name of the object.
     pub object: String,
@@ -48,11 +48,12 @@ pub struct Cell {
     /// Failed trials by the first stage that failed; absent stages count as zero.
     pub failures: BTreeMap<FailureStage, u64>,
     /// Success rate with every threshold scaled; empty if it was not computed.
+    #[serde(default)]
     pub threshold_curve: Vec<ThresholdPoint>,
 }
 
 /// One point of the success-against-threshold curve.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct ThresholdPoint {
     /// Factor on the position, angle and joint thresholds.
     pub scale: f64,
@@ -128,7 +129,7 @@ pub struct TrainingEpoch {
 }
 
 /// What exploration did.
-#[derive(Debug, Clone, PartialEq, Default, Serialize)]
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct ExplorationSummary {
     /// Trials run.
     pub trials: u64,
@@ -143,7 +144,7 @@ pub struct ExplorationSummary {
 }
 
 /// One round of exploration.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub struct ExplorationRound {
     /// Trials of this round.
     pub trials: u64,

@@ -94,7 +94,7 @@ fn contact_maps() -> ContactMapFigure {
     let world_from_half = frame[frame.len() - 1];
     figure.maps = (0..5)
         .map(|code| {
-            let mut channel = |sign: f64| {
+            let channel = |sign: f64| {
                 let peak = world_from_half * Point3::new(-0.135 + 0.02 * f64::from(code), -0.013 + sign * 0.009, 0.0);
                 let bump = |p: &[f32; 3]| {
                     let away = (Point3::new(f64::from(p[0]), f64::from(p[1]), f64::from(p[2])) - peak).norm();
