@@ -12,5 +12,6 @@ mod json_place;
 pub mod ocao;
 pub mod output;
 pub mod provenance;
+pub mod report;
 pub mod results;
 pub mod wording;

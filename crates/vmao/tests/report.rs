@@ -1,0 +1,99 @@
+//! The report page: self-contained, robust to hostile and empty data, and there to be looked at.
+
+mod synthetic;
+
+use vmao::report::{Cell, ReportData, TrainingCurve, TrainingEpoch, render};
+
+/// The JSON that a page carries, read back the way a browser finds it.
+#[track_caller]
+fn carried(page: &str) -> serde_json::Value {
+    let opening = r#"<script type="application/json" id="report-data">"#;
+    let (_, rest) = page.split_once(opening).expect("the page carries data");
+    let (json, _) = rest.split_once("</script").expect("the data ends");
+    serde_json::from_str(json).expect("the data is JSON")
+}
+
+#[test]
+fn a_full_report_is_written_for_looking_at() {
+    let page = render(&synthetic::report());
+    let path = std::path::Path::new(env!("CARGO_TARGET_TMPDIR")).join("report.html");
+    std::fs::write(&path, &page).unwrap();
+    let data = carried(&page);
+    assert_eq!(data["cells"][0]["failures"]["no-contact"], 2);
+    assert_eq!(data["cells"][0]["order"], "sequential");
+    assert_eq!(data["contact_maps"][0]["maps"].as_array().unwrap().len(), 5);
+    assert_eq!(data["provenance"]["seed"], u64::MAX.to_string());
+    let rollout = &data["rollouts"][0]["rollout"];
+    let (bodies, frames) = (rollout["bodies"].as_array().unwrap().len(), synthetic::motion::rollout(false).frames.len());
+    // base64 of 7 little-endian f32 for every body of every frame
+    assert_eq!(rollout["poses"].as_str().unwrap().len(), (bodies * frames * 28).div_ceil(3) * 4);
+    assert_eq!(page, render(&synthetic::report()), "the same data gives the same page");
+}
+
+#[test]
+fn nothing_in_the_page_is_loaded_from_elsewhere() {
+    let page = render(&ReportData::default());
+    for loads in ["src=\"", "href=\"http", "href=\"//", "@import", "url(", "@font-face"] {
+        let html = page.replace("<script>", "\n<script>");
+        let outside_script = html.split("\n<script>").next().unwrap();
+        assert!(!outside_script.contains(loads), "{loads}");
+    }
+    assert!(page.contains("default-src 'none'"), "the browser is told to load nothing");
+}
+
+#[test]
+fn hostile_text_stays_text() {
+    let hostile = "</script><script>alert(1)</script><!-- {{data}} & \" ' \u{2028}";
+    let mut data = synthetic::report();
+    data.title = hostile.into();
+    data.summary = hostile.into();
+    data.cells[0].object = hostile.into();
+    data.rollouts[0].rollout.outcome = hostile.into();
+    data.provenance.config = hostile.into();
+    let page = render(&data);
+    std::fs::write(std::path::Path::new(env!("CARGO_TARGET_TMPDIR")).join("report-hostile.html"), &page).unwrap();
+    let back = carried(&page);
+    for text in [&back["title"], &back["summary"], &back["cells"][0]["object"], &back["provenance"]["config"]] {
+        assert_eq!(text, hostile);
+    }
+    let plain = render(&synthetic::report());
+    for tag in ["<script", "</script", "<!--"] {
+        assert_eq!(page.matches(tag).count(), plain.matches(tag).count(), "{tag}");
+    }
+}
+
+#[test]
+fn a_cell_of_results_json_is_a_row_of_the_table() {
+    let cell: Cell = serde_json::from_str(
+        r#"{"object": "three-sticks", "robots": ["sawyer", "sawyer", "sawyer"], "order": "sequential-parallel", "method": "vmao",
+            "trials": 500, "successes": 430, "rate": 0.86, "wilson95": [0.827, 0.888],
+            "failures": {"no-contact": 40, "unreachable": 0, "no-plan": 0, "collision": 0, "slip": 30, "threshold": 0, "timeout": 0}}"#,
+    )
+    .unwrap();
+    assert_eq!(cell.failures[&vmao_core::outcome::FailureStage::Slip], 30);
+    let back = carried(&render(&ReportData { cells: vec![cell], ..ReportData::default() }));
+    assert_eq!(back["cells"][0]["failures"]["no-contact"], 40);
+    assert_eq!(back["cells"][0]["order"], "sequential-parallel");
+}
+
+#[test]
+fn an_empty_report_and_numbers_that_are_none_are_still_json() {
+    assert!(carried(&render(&ReportData::default()))["exploration"].is_null());
+    let mut data = synthetic::report();
+    data.cells[0].rate = f64::NAN;
+    data.cells[0].wilson95 = [f64::NEG_INFINITY, f64::INFINITY];
+    data.contact_maps[0].points[0] = [f32::NAN; 3];
+    data.contact_maps[0].maps[0].finger1[0] = f32::NAN;
+    data.contact_maps[0].maps[0].latent[0] = f32::INFINITY;
+    data.rollouts[0].rollout.frames[3][2].translation.x = f64::NAN;
+    let none =
+        TrainingEpoch { train_reconstruction: f64::NAN, validation_reconstruction: 1.0, kl: f64::INFINITY, beta: f64::NAN };
+    data.training.push(TrainingCurve { model: "broken".into(), epochs: vec![none; 3] });
+    let page = render(&data);
+    let back = carried(&page);
+    assert!(back["cells"][0]["rate"].is_null() && back["cells"][0]["wilson95"][1].is_null());
+    assert!(back["training"][2]["epochs"][0]["kl"].is_null());
+    let folder = std::path::Path::new(env!("CARGO_TARGET_TMPDIR"));
+    std::fs::write(folder.join("report-broken.html"), &page).unwrap();
+    std::fs::write(folder.join("report-empty.html"), render(&ReportData::default())).unwrap();
+}

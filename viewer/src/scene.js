@@ -1,0 +1,193 @@
+// The three-dimensional scene of a rollout: bodies, light and shadow, the goal as a green ghost, asked contact points.
+
+import {
+  AmbientLight, Box3, Color, DirectionalLight, Group, HemisphereLight, LessEqualDepth, Matrix4, Mesh, MeshBasicMaterial,
+  MeshStandardMaterial, Object3D, Scene, SphereGeometry, Vector3,
+} from "three";
+import { unpackFloats } from "./data.js";
+import { Motion, readPose } from "./motion.js";
+import { FINGERS, GOAL } from "./palette.js";
+import { distanceTo, placeSolid, solidGeometry } from "./solids.js";
+
+const BALL = 0.0065; // m
+
+export class RolloutScene {
+  constructor(rollout) {
+    this.rollout = rollout;
+    this.motion = new Motion(rollout);
+    this.scene = new Scene();
+    this.armMaterials = [];
+    this.bodies = rollout.bodies.map((body) => this.body(body));
+    this.ghost = this.makeGhost();
+    this.place(0);
+    this.frame = this.measure();
+    this.light();
+    this.contacts = this.makeContacts();
+    this.place(0);
+  }
+
+  body({ solids, kind }) {
+    const group = new Group();
+    for (const { shape, pose, color } of solids) {
+      const material = new MeshStandardMaterial({ color: new Color().setRGB(...color, "srgb"), roughness: kind === "table" ? 0.95 : 0.5, metalness: 0.02 });
+      if (kind === "arm") this.armMaterials.push(material);
+      const mesh = new Mesh(solidGeometry(shape), material);
+      placeSolid(mesh, pose);
+      mesh.castShadow = kind !== "table";
+      mesh.receiveShadow = true;
+      group.add(mesh);
+    }
+    this.scene.add(group);
+    return group;
+  }
+
+  /** The parts at the goal. A depth-only pass first, so that overlapping solids show one even green. */
+  makeGhost() {
+    const ghost = new Group();
+    const goal = unpackFloats(this.rollout.goal);
+    const hidden = new MeshBasicMaterial({ colorWrite: false, transparent: true });
+    const green = new MeshStandardMaterial({ color: GOAL, emissive: new Color(GOAL), emissiveIntensity: 0.12, transparent: true, opacity: 0.58, depthFunc: LessEqualDepth, roughness: 0.8 });
+    const parts = this.rollout.bodies.filter(({ kind }) => kind === "part");
+    parts.forEach(({ solids }, index) => {
+      const group = new Group();
+      if (!readPose(goal, 7 * index, group.position, group.quaternion)) return;
+      for (const { shape, pose } of solids) {
+        for (const [material, order] of [[hidden, 1], [green, 2]]) {
+          const mesh = new Mesh(solidGeometry(shape), material);
+          placeSolid(mesh, pose);
+          mesh.renderOrder = order;
+          group.add(mesh);
+        }
+      }
+      ghost.add(group);
+    });
+    this.scene.add(ghost);
+    return ghost;
+  }
+
+  /** What the camera should see: where the parts go, and the arms' bases. */
+  measure() {
+    const box = new Box3();
+    const bases = new Map();
+    const probe = new Object3D();
+    this.rollout.bodies.forEach(({ kind, index }, i) => {
+      this.motion.place(i, 0, probe);
+      if (kind === "arm" && !bases.has(index)) bases.set(index, probe.position.clone());
+      if (kind === "table") return;
+      const steps = kind === "part" ? 24 : 6;
+      for (let k = 0; k <= steps; k++) {
+        this.motion.place(i, (this.motion.duration * k) / steps, probe);
+        box.expandByPoint(probe.position);
+      }
+    });
+    this.ghost.children.forEach((part) => box.expandByPoint(part.position));
+    const work = new Box3();
+    this.rollout.bodies.forEach(({ kind }, i) => {
+      if (kind !== "part") return;
+      for (let k = 0; k <= 24; k++) {
+        this.motion.place(i, (this.motion.duration * k) / 24, probe);
+        work.expandByPoint(probe.position);
+      }
+    });
+    this.ghost.children.forEach((part) => work.expandByPoint(part.position));
+    if (box.isEmpty()) box.set(new Vector3(-0.5, -0.5, 0), new Vector3(0.5, 0.5, 0.5));
+    const size = box.getSize(new Vector3());
+    if (work.isEmpty()) work.copy(box);
+    const target = work.getCenter(new Vector3());
+    target.z = 0.6 * target.z + 0.4 * (box.min.z + 0.5 * size.z);
+    const near = { middle: work.getCenter(new Vector3()), radius: Math.max(0.14, 0.5 * work.getSize(new Vector3()).length()) };
+    return { target, radius: Math.max(0.15, 0.5 * size.length()), front: frontAzimuth([...bases.values()], target), work: near };
+  }
+
+  light() {
+    const { target, radius } = this.frame;
+    const key = new DirectionalLight(0xfff8ee, 2.3);
+    key.position.copy(target).add(new Vector3(0.5, -0.9, 2.0).multiplyScalar(radius * 1.6));
+    key.target.position.copy(target);
+    key.castShadow = true;
+    key.shadow.mapSize.set(2048, 2048);
+    key.shadow.radius = 3;
+    key.shadow.intensity = 0.48;
+    key.shadow.autoUpdate = false;
+    this.shadow = key.shadow;
+    key.shadow.bias = -0.0008;
+    key.shadow.normalBias = 0.012;
+    Object.assign(key.shadow.camera, { left: -1.3 * radius, right: 1.3 * radius, top: 1.3 * radius, bottom: -1.3 * radius, near: 0.1 * radius, far: 6 * radius });
+    const fill = new DirectionalLight(0xdfe9ff, 0.6);
+    fill.position.copy(target).add(new Vector3(-1, 0.8, 0.7));
+    fill.target.position.copy(target);
+    this.scene.add(key, key.target, fill, fill.target, new HemisphereLight(0xffffff, 0xd9d4ca, 1.7), new AmbientLight(0xffffff, 0.35));
+  }
+
+  /** Balls where fingers were asked to touch; each rides on the body it lies on. Shown from the stage before the grasp on. */
+  makeContacts() {
+    const shape = new SphereGeometry(BALL, 24, 16);
+    const out = [];
+    for (const [time, , first, second] of this.rollout.contacts) {
+      this.place(time);
+      const shown = this.rollout.events.filter((event) => event.time < time - 1e-6).at(-1)?.time ?? 0;
+      [first, second].forEach((position, finger) => {
+        if (!position.every(Number.isFinite)) return;
+        const point = new Vector3(...position);
+        const carrier = this.nearestPart(point);
+        const ball = new Group();
+        // A faint second ball shows through the fingers that close over the point.
+        ball.add(new Mesh(shape, new MeshStandardMaterial({ color: FINGERS[finger], emissive: new Color(FINGERS[finger]), emissiveIntensity: 0.35, roughness: 0.4 })));
+        const through = new Mesh(shape, new MeshBasicMaterial({ color: FINGERS[finger], transparent: true, opacity: 0.35, depthTest: false }));
+        through.renderOrder = 5;
+        ball.add(through);
+        (carrier ?? this.scene).add(ball);
+        ball.position.copy(carrier ? carrier.worldToLocal(point) : point);
+        out.push({ ball, shown });
+      });
+    }
+    return out;
+  }
+
+  nearestPart(point) {
+    let best = null;
+    let least = Infinity;
+    const into = new Matrix4();
+    this.rollout.bodies.forEach(({ kind, solids }, i) => {
+      if (kind !== "part") return;
+      const group = this.bodies[i];
+      group.updateWorldMatrix(true, true);
+      group.children.slice(0, solids.length).forEach((mesh, k) => {
+        const distance = distanceTo(solids[k].shape, point.clone().applyMatrix4(into.copy(mesh.matrixWorld).invert()));
+        if (distance < least) [best, least] = [group, distance];
+      });
+    });
+    return best;
+  }
+
+  /** Solid arms, or arms like glass that do not hide the parts. */
+  setArms(solid) {
+    for (const material of this.armMaterials) {
+      Object.assign(material, { transparent: !solid, opacity: solid ? 1 : 0.16, depthWrite: solid });
+      material.needsUpdate = true;
+    }
+  }
+
+  /** Moves everything to `time` (s). */
+  place(time) {
+    if (this.shadow && time !== this.time) this.shadow.needsUpdate = true;
+    this.time = time;
+    this.bodies.forEach((group, i) => this.motion.place(i, time, group));
+    for (const { ball, shown } of this.contacts ?? []) ball.visible = this.contactsOn !== false && time >= shown - 1e-9;
+  }
+}
+
+/** The horizontal direction to look from so that the arms stand side by side. */
+function frontAzimuth(bases, target) {
+  let far = null;
+  for (const a of bases) {
+    for (const b of bases) {
+      const gap = Math.hypot(a.x - b.x, a.y - b.y);
+      if (gap > (far?.gap ?? 0.05)) far = { gap, angle: Math.atan2(b.y - a.y, b.x - a.x) };
+    }
+  }
+  const front = far ? far.angle - Math.PI / 2 : 0;
+  // The work stands between the reader and the arms, not behind them.
+  const behind = bases.reduce((sum, base) => sum + (target.x - base.x) * Math.cos(front) + (target.y - base.y) * Math.sin(front), 0);
+  return behind < -0.2 * bases.length ? front + Math.PI : front;
+}
