@@ -1,0 +1,86 @@
+//! The first layer of a grouped MLP, with the matrix product done before the gather.
+//!
+//! A grouped row is [offset, feature of the source]; its product with W = [W_o; W_f] is offset·W_o + (F W_f)[source], so the
+//! large product runs once per source instead of once per neighbour.
+
+use super::blocks::{BLOCK, add_in_order, narrow};
+use super::gather::Picks;
+use super::linear::{linear, linear_backward};
+use super::norm::{Gradient, Moments, Tape, accumulate, affine, affine_relu};
+use rayon::prelude::*;
+
+/// Neighbour pairs: which feature row each grouped row takes, and where that source lies from its centre.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Edges {
+    /// Feature row of each grouped row.
+    pub(crate) picks: Picks,
+    /// Source minus centre, three numbers per grouped row, in units of the layer's radius.
+    pub(crate) offsets: Vec<f32>,
+}
+
+/// Adds offset·W_o to each row of `z`.
+pub(crate) fn add_offsets(z: &mut [f32], offsets: &[f32], weight: &[f32], channels: usize) {
+    let (wx, rest) = weight.split_at(channels);
+    let (wy, rest) = rest.split_at(channels);
+    let wz = &rest[..channels];
+    for (z, o) in z.chunks_exact_mut(channels).zip(offsets.chunks_exact(3)) {
+        for c in 0..channels {
+            z[c] += o[0] * wx[c] + o[1] * wy[c] + o[2] * wz[c];
+        }
+    }
+}
+
+/// y = relu(bn([offset, features[source]] W)); `features` table rows × inputs, `weight` (3 + inputs) × channels.
+pub(crate) fn norm_relu(features: &[f32], weight: &[f32], gain: &[f32], bias: &[f32], edges: &Edges) -> (Vec<f32>, Tape) {
+    let channels = gain.len();
+    let table = linear(features, &weight[3 * channels..], &[], channels);
+    let rows = edges.picks.sources.len();
+    let mut z = vec![0.0; rows * channels];
+    let partials: Vec<Vec<f32>> = z
+        .par_chunks_mut(BLOCK * channels)
+        .zip(edges.picks.sources.par_chunks(BLOCK))
+        .zip(edges.offsets.par_chunks(BLOCK * 3))
+        .map(|((z, sources), offsets)| {
+            for (z, &source) in z.chunks_exact_mut(channels).zip(sources) {
+                z.copy_from_slice(&table[source as usize * channels..(source as usize + 1) * channels]);
+            }
+            add_offsets(z, offsets, weight, channels);
+            let mut sums = vec![0.0; 2 * channels];
+            accumulate(z, &mut sums);
+            sums
+        })
+        .collect();
+    let moments = Moments::from_sums(&add_in_order(&partials, 2 * channels), rows);
+    let (scale, shift) = affine(&moments, gain, bias);
+    let y = affine_relu(&z, &scale, &shift);
+    (y, Tape { z, moments, gain: gain.to_vec(), bias: bias.to_vec() })
+}
+
+/// Gradients of [`norm_relu`] by features, W, γ, β.
+pub(crate) fn norm_relu_backward(features: &[f32], weight: &[f32], edges: &Edges, tape: &Tape, dy: &[f32]) -> [Vec<f32>; 4] {
+    let gradient = Gradient::new(tape, dy);
+    let channels = tape.gain.len();
+    let mut dz = vec![0.0; dy.len()];
+    let partials: Vec<Vec<f32>> = dz
+        .par_chunks_mut(BLOCK * channels)
+        .zip(dy.par_chunks(BLOCK * channels))
+        .zip(edges.offsets.par_chunks(BLOCK * 3))
+        .enumerate()
+        .map(|(block, ((dz, dy), offsets))| {
+            gradient.dz(block * BLOCK, dy, dz);
+            let mut dw = vec![0.0; 3 * channels];
+            for (dz, o) in dz.chunks_exact(channels).zip(offsets.chunks_exact(3)) {
+                for (axis, &o) in o.iter().enumerate() {
+                    let dw = &mut dw[axis * channels..(axis + 1) * channels];
+                    dw.iter_mut().zip(dz).for_each(|(dw, dz)| *dw += o * dz);
+                }
+            }
+            dw
+        })
+        .collect();
+    let mut dw = narrow(&add_in_order(&partials, 3 * channels));
+    let dtable = edges.picks.scatter_add(&dz, channels);
+    let [dfeatures, dw_features, _] = linear_backward(features, &weight[3 * channels..], &dtable, channels);
+    dw.extend(dw_features);
+    [dfeatures, dw, gradient.gain, gradient.bias]
+}
