@@ -225,7 +225,7 @@ impl Backward<Flex, 1> for Gather {
 struct MaxPool;
 
 impl Backward<Flex, 1> for MaxPool {
-    type State = (Arc<Vec<u16>>, usize, usize);
+    type State = (Arc<Vec<u32>>, usize, usize);
 
     fn backward(self, ops: Ops<Self::State, 1>, grads: &mut Gradients, _: &mut Checkpointer) {
         let (winner, k, channels) = &ops.state;

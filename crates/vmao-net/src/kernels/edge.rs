@@ -22,7 +22,7 @@ pub(crate) struct Edges {
 pub(crate) fn add_offsets(z: &mut [f32], offsets: &[f32], weight: &[f32], channels: usize) {
     let (wx, rest) = weight.split_at(channels);
     let (wy, rest) = rest.split_at(channels);
-    let wz = &rest[..channels];
+    let (wx, wy, wz) = (&wx[..channels], &wy[..channels], &rest[..channels]);
     for (z, o) in z.chunks_exact_mut(channels).zip(offsets.chunks_exact(3)) {
         for c in 0..channels {
             z[c] += o[0] * wx[c] + o[1] * wy[c] + o[2] * wz[c];

@@ -4,10 +4,10 @@ use super::blocks::BLOCK;
 use rayon::prelude::*;
 
 /// Returns groups × channels and, for each, which of the `k` rows won (the first of equals).
-pub(crate) fn max_pool(x: &[f32], k: usize, channels: usize) -> (Vec<f32>, Vec<u16>) {
-    assert!(k > 0 && k <= usize::from(u16::MAX) && x.len().is_multiple_of(k * channels), "groups of {k} rows");
+pub(crate) fn max_pool(x: &[f32], k: usize, channels: usize) -> (Vec<f32>, Vec<u32>) {
+    assert!(k > 0 && k <= u32::MAX as usize && x.len().is_multiple_of(k * channels), "groups of {k} rows");
     let groups = x.len() / (k * channels);
-    let (mut best, mut winner) = (vec![0.0; groups * channels], vec![0_u16; groups * channels]);
+    let (mut best, mut winner) = (vec![0.0; groups * channels], vec![0_u32; groups * channels]);
     best.par_chunks_mut(BLOCK * channels)
         .zip(winner.par_chunks_mut(BLOCK * channels))
         .zip(x.par_chunks(BLOCK * k * channels))
@@ -16,10 +16,12 @@ pub(crate) fn max_pool(x: &[f32], k: usize, channels: usize) -> (Vec<f32>, Vec<u
             for ((best, winner), x) in groups.zip(x.chunks_exact(k * channels)) {
                 best.copy_from_slice(&x[..channels]);
                 for (j, row) in x.chunks_exact(channels).enumerate().skip(1) {
+                    let (best, winner) = (&mut best[..channels], &mut winner[..channels]);
                     for c in 0..channels {
-                        let better = row[c] > best[c];
-                        best[c] = if better { row[c] } else { best[c] };
-                        winner[c] = if better { j as u16 } else { winner[c] };
+                        // Masks, not branches: this loop is as long as the whole grouped layer.
+                        let better = 0_u32.wrapping_sub(u32::from(row[c] > best[c]));
+                        winner[c] = (winner[c] & !better) | (j as u32 & better);
+                        best[c] = best[c].max(row[c]);
                     }
                 }
             }
@@ -28,7 +30,7 @@ pub(crate) fn max_pool(x: &[f32], k: usize, channels: usize) -> (Vec<f32>, Vec<u
 }
 
 /// Gradient of [`max_pool`] by x: each winner receives its group's gradient.
-pub(crate) fn max_pool_backward(dy: &[f32], winner: &[u16], k: usize, channels: usize) -> Vec<f32> {
+pub(crate) fn max_pool_backward(dy: &[f32], winner: &[u32], k: usize, channels: usize) -> Vec<f32> {
     let mut dx = vec![0.0; dy.len() * k];
     dx.par_chunks_mut(BLOCK * k * channels)
         .zip(dy.par_chunks(BLOCK * channels))
@@ -37,7 +39,7 @@ pub(crate) fn max_pool_backward(dy: &[f32], winner: &[u16], k: usize, channels: 
             let groups = dy.chunks_exact(channels).zip(winner.chunks_exact(channels));
             for (dx, (dy, winner)) in dx.chunks_exact_mut(k * channels).zip(groups) {
                 for c in 0..channels {
-                    dx[usize::from(winner[c]) * channels + c] = dy[c];
+                    dx[winner[c] as usize * channels + c] = dy[c];
                 }
             }
         });

@@ -44,6 +44,8 @@ pub(crate) fn accumulate(z: &[f32], sums: &mut [f32]) {
     let channels = sums.len() / 2;
     let (first, second) = sums.split_at_mut(channels);
     for row in z.chunks_exact(channels) {
+        // Slices of one known length let the compiler drop the bounds checks and vectorise.
+        let (first, second) = (&mut first[..channels], &mut second[..channels]);
         for c in 0..channels {
             first[c] += row[c];
             second[c] += row[c] * row[c];
@@ -56,6 +58,7 @@ pub(crate) fn affine_relu(z: &[f32], scale: &[f32], shift: &[f32]) -> Vec<f32> {
     let channels = scale.len();
     let mut y = vec![0.0; z.len()];
     y.par_chunks_mut(BLOCK * channels).zip(z.par_chunks(BLOCK * channels)).for_each(|(y, z)| {
+        let (scale, shift) = (&scale[..channels], &shift[..channels]);
         for (y, z) in y.chunks_exact_mut(channels).zip(z.chunks_exact(channels)) {
             for c in 0..channels {
                 y[c] = (scale[c] * z[c] + shift[c]).max(0.0);
@@ -63,6 +66,11 @@ pub(crate) fn affine_relu(z: &[f32], scale: &[f32], shift: &[f32]) -> Vec<f32> {
         }
     });
     y
+}
+
+/// 1 where ReLU lets the gradient through, else 0: a factor, because a branch would keep the loop from being vectorised.
+fn alive(y: f32) -> f32 {
+    f32::from(u8::from(y > 0.0))
 }
 
 /// What the forward pass keeps for the backward pass: z, its moments, γ and β.
@@ -82,11 +90,10 @@ pub(crate) struct Tape {
 #[derive(Debug)]
 pub(crate) struct Gradient<'a> {
     tape: &'a Tape,
-    inverse: Vec<f32>,
     scale: Vec<f32>,
     shift: Vec<f32>,
-    mean_gain: Vec<f32>,
-    mean_bias: Vec<f32>,
+    constant: Vec<f32>,
+    slope: Vec<f32>,
     /// ∂L/∂γ.
     pub(crate) gain: Vec<f32>,
     /// ∂L/∂β.
@@ -99,33 +106,38 @@ impl<'a> Gradient<'a> {
         let channels = tape.gain.len();
         let rows = tape.z.len() / channels;
         let (scale, shift) = affine(&tape.moments, &tape.gain, &tape.bias);
-        let inverse = tape.moments.inverse_deviation();
         let sums = sum_blocks(rows, 2 * channels, |range, sums| {
+            let (scale, shift, mean) = (&scale[..channels], &shift[..channels], &tape.moments.mean[..channels]);
             let (gain, bias) = sums.split_at_mut(channels);
             let span = range.start * channels..range.end * channels;
             for (z, dy) in tape.z[span.clone()].chunks_exact(channels).zip(dy[span].chunks_exact(channels)) {
+                let (gain, bias) = (&mut gain[..channels], &mut bias[..channels]);
                 for c in 0..channels {
-                    let g = if scale[c] * z[c] + shift[c] > 0.0 { dy[c] } else { 0.0 };
-                    gain[c] += g * (z[c] - tape.moments.mean[c]) * inverse[c];
+                    let g = dy[c] * alive(scale[c] * z[c] + shift[c]);
+                    gain[c] += g * (z[c] - mean[c]);
                     bias[c] += g;
                 }
             }
         });
-        let mean: Vec<f64> = sums.iter().map(|sum| sum / rows as f64).collect();
-        let (mean_gain, mean_bias) = (narrow(&mean[..channels]), narrow(&mean[channels..]));
-        let (gain, bias) = (narrow(&sums[..channels]), narrow(&sums[channels..]));
-        Self { tape, inverse, scale, shift, mean_gain, mean_bias, gain, bias }
+        let inverse = tape.moments.inverse_deviation();
+        let gain: Vec<f32> = (0..channels).map(|c| (sums[c] * f64::from(inverse[c])) as f32).collect();
+        let bias = narrow(&sums[channels..]);
+        // scale (g − mean g − ẑ mean(g ẑ)) = scale g + constant + slope z.
+        let slope: Vec<f32> = (0..channels).map(|c| -scale[c] * inverse[c] * gain[c] / rows as f32).collect();
+        let constant = (0..channels).map(|c| -scale[c] * bias[c] / rows as f32 - slope[c] * tape.moments.mean[c]).collect();
+        Self { tape, scale, shift, constant, slope, gain, bias }
     }
 
     /// ∂L/∂z of the rows from `first`: scale (g − mean g − ẑ mean(g ẑ)), g = ∂L/∂y where y > 0.
     pub(crate) fn dz(&self, first: usize, dy: &[f32], dz: &mut [f32]) {
         let channels = self.gain.len();
+        let (scale, shift) = (&self.scale[..channels], &self.shift[..channels]);
+        let (constant, slope) = (&self.constant[..channels], &self.slope[..channels]);
         let z = &self.tape.z[first * channels..first * channels + dy.len()];
         for ((z, dy), dz) in z.chunks_exact(channels).zip(dy.chunks_exact(channels)).zip(dz.chunks_exact_mut(channels)) {
             for c in 0..channels {
-                let g = if self.scale[c] * z[c] + self.shift[c] > 0.0 { dy[c] } else { 0.0 };
-                let normal = (z[c] - self.tape.moments.mean[c]) * self.inverse[c];
-                dz[c] = self.scale[c] * (g - self.mean_bias[c] - normal * self.mean_gain[c]);
+                let g = dy[c] * alive(scale[c] * z[c] + shift[c]);
+                dz[c] = scale[c] * g + (constant[c] + slope[c] * z[c]);
             }
         }
     }

@@ -28,9 +28,10 @@ pub fn farthest_point_order(points: &[[f32; 3]], count: usize) -> Vec<u32> {
         // A point that was taken never comes again, even in a cloud of equal points.
         distance[last] = f32::NEG_INFINITY;
         let (cx, cy, cz) = (x[last], y[last], z[last]);
-        for i in 0..distance.len() {
-            let (dx, dy, dz) = (x[i] - cx, y[i] - cy, z[i] - cz);
-            distance[i] = distance[i].min(dx * dx + dy * dy + dz * dz);
+        for (((distance, x), y), z) in distance.iter_mut().zip(&x).zip(&y).zip(&z) {
+            let (dx, dy, dz) = (x - cx, y - cy, z - cz);
+            let squared = dx * dx + dy * dy + dz * dz;
+            *distance = if squared < *distance { squared } else { *distance };
         }
         last = largest(&distance);
     }
@@ -40,10 +41,14 @@ pub fn farthest_point_order(points: &[[f32; 3]], count: usize) -> Vec<u32> {
 fn largest(values: &[f32]) -> usize {
     const LANES: usize = 16;
     let mut best = [f32::NEG_INFINITY; LANES];
-    for chunk in values.chunks(LANES) {
+    let (whole, rest) = values.as_chunks::<LANES>();
+    for chunk in whole {
         for (best, &value) in best.iter_mut().zip(chunk) {
-            *best = best.max(value);
+            *best = if value > *best { value } else { *best };
         }
+    }
+    for (best, &value) in best.iter_mut().zip(rest) {
+        *best = best.max(value);
     }
     let top = best.iter().fold(f32::NEG_INFINITY, |a, &b| a.max(b));
     values.iter().position(|&value| value >= top).unwrap_or(0)
