@@ -60,10 +60,10 @@ mod tests {
         layout.add("x".to_owned(), [1, 2], Start::Constant(2.0));
         let mut parameters = layout.start(0);
         let mut adam = Adam::new(layout.specs());
-        for step in 0..600 {
+        for step in 0..2000 {
             let x = &parameters.values[0];
             let gradient = vec![2.0 * (x[0] - 0.5), 20.0 * (x[1] + 1.0)];
-            adam.update(&mut parameters, &[Some(gradient)], 0.05 * 0.99_f32.powi(step));
+            adam.update(&mut parameters, &[Some(gradient)], 0.1 * 0.997_f32.powi(step));
         }
         assert!((parameters.values[0][0] - 0.5).abs() < 1e-2 && (parameters.values[0][1] + 1.0).abs() < 1e-2);
     }

@@ -17,6 +17,8 @@ mod error;
 mod kernels;
 mod layers;
 mod network;
+#[cfg(test)]
+mod objective_checks;
 mod parameters;
 mod pyramid;
 mod tape;

@@ -251,3 +251,99 @@ impl Backward<Flex, 1> for CrossEntropy {
         hand_out!(grads, ops.parents[0] => dx, &[rows, cross_entropy::FINGERS]);
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::kernels::finite_difference::normal;
+    use burn::tensor::activation::{log_softmax, relu};
+    use burn::tensor::{Int, s};
+
+    type T2 = Tensor<Cpu, 2>;
+
+    fn leaf(seed: u64, rows: usize, columns: usize) -> T2 {
+        T2::from_data(TensorData::new(normal(seed, rows * columns), [rows, columns]), &Default::default()).require_grad()
+    }
+
+    /// Compares two ways to compute the same thing from the same leaves: values and all gradients, by their largest size.
+    #[track_caller]
+    fn agree(leaves: &[T2], fused: T2, stock: T2) {
+        let list = |t: Tensor<Flex, 2>| t.into_data().into_vec::<f32>().unwrap();
+        let close = |what: &str, a: Vec<f32>, b: Vec<f32>| {
+            assert_eq!(a.len(), b.len());
+            let size = b.iter().fold(0.0_f32, |m, x| m.max(x.abs()));
+            assert!(size > 1e-3, "{what} is zero and tests nothing");
+            let gap = a.iter().zip(&b).fold(0.0_f32, |m, (x, y)| m.max((x - y).abs()));
+            assert!(gap < 2e-5 * size, "{what}: {gap} of {size}");
+        };
+        close("value", list(fused.clone().inner()), list(stock.clone().inner()));
+        let [rows, columns] = fused.dims();
+        let weight = leaf(99, rows, columns).detach();
+        let (a, b) = ((fused * weight.clone()).sum().backward(), (stock * weight).sum().backward());
+        for (i, leaf) in leaves.iter().enumerate() {
+            close(&format!("gradient of input {i}"), list(leaf.grad(&a).unwrap()), list(leaf.grad(&b).unwrap()));
+        }
+    }
+
+    fn stock_norm_relu(z: T2, gain: T2, bias: T2) -> T2 {
+        let centred = z.clone() - z.mean_dim(0);
+        let variance = centred.clone().powi_scalar(2).mean_dim(0);
+        relu(centred / (variance + crate::kernels::norm::EPSILON).sqrt() * gain + bias)
+    }
+
+    #[test]
+    fn the_fused_normalised_layer_agrees_with_burns_own_operations() {
+        let [x, w, g, b] = [leaf(1, 613, 11), leaf(2, 11, 9), leaf(3, 1, 9), leaf(4, 1, 9)];
+        let (fused, _) = Cpu::linear_norm_relu(x.clone(), w.clone(), g.clone(), b.clone());
+        let stock = stock_norm_relu(x.clone().matmul(w.clone()), g.clone(), b.clone());
+        agree(&[x, w, g, b], fused, stock);
+    }
+
+    #[test]
+    fn the_fused_grouped_layer_agrees_with_burns_own_operations() {
+        let [x, w, g, b] = [leaf(1, 83, 6), leaf(2, 9, 13), leaf(3, 1, 13), leaf(4, 1, 13)];
+        let sources: Vec<u32> = (0..700).map(|i: u32| (i * i + 3 * i) % 83).collect();
+        let offsets = normal(8, 2100);
+        let edges = Arc::new(Edges { picks: Picks::new(sources.clone(), 83), offsets: offsets.clone() });
+        let (fused, _) = Cpu::edge_norm_relu(x.clone(), w.clone(), g.clone(), b.clone(), &edges);
+        let index = Tensor::<Cpu, 1, Int>::from_data(
+            TensorData::new(sources.iter().map(|&s| i64::from(s)).collect::<Vec<_>>(), [700]),
+            &Default::default(),
+        );
+        let offsets = T2::from_data(TensorData::new(offsets, [700, 3]), &Default::default());
+        let rows = Tensor::cat(vec![offsets, x.clone().select(0, index)], 1);
+        let stock = stock_norm_relu(rows.matmul(w.clone()), g.clone(), b.clone());
+        agree(&[x, w, g, b], fused, stock);
+    }
+
+    #[test]
+    fn linear_gather_and_maximum_agree_with_burns_own_operations() {
+        let [x, w, b] = [leaf(1, 300, 7), leaf(2, 7, 3), leaf(3, 1, 3)];
+        agree(&[x.clone(), w.clone(), b.clone()], Cpu::affine(x.clone(), w.clone(), b.clone()), x.clone().matmul(w) + b);
+        let sources: Vec<u32> = (0..410).map(|i: u32| (7 * i * i) % 300).collect();
+        let index = TensorData::new(sources.iter().map(|&s| i64::from(s)).collect::<Vec<_>>(), [410]);
+        let stock = x.clone().select(0, Tensor::<Cpu, 1, Int>::from_data(index, &Default::default()));
+        agree(&[x.clone()], Cpu::gather(x.clone(), &Arc::new(Picks::new(sources, 300))), stock);
+        let stock = x.clone().reshape([60, 5, 7]).max_dim(1).reshape([60, 7]);
+        agree(&[x.clone()], Cpu::max_pool(x, 5), stock);
+    }
+
+    #[test]
+    fn cross_entropy_agrees_with_burns_own_operations() {
+        let x = leaf(1, 40, 2);
+        let targets: Vec<f32> = normal(2, 80).iter().map(|t| t.abs()).collect();
+        let starts = [0, 13, 40];
+        let mut scaled = targets.clone();
+        for cloud in starts.windows(2) {
+            for finger in 0..2 {
+                let rows = || (cloud[0]..cloud[1]).map(move |r| r * 2 + finger);
+                let total: f32 = rows().map(|i| targets[i]).sum();
+                rows().for_each(|i| scaled[i] = targets[i] / total);
+            }
+        }
+        let p = T2::from_data(TensorData::new(scaled.clone(), [40, 2]), &Default::default());
+        let term = |a: usize, b: usize| (log_softmax(x.clone().slice(s![a..b, ..]), 0) * p.clone().slice(s![a..b, ..])).sum();
+        let stock = (term(0, 13) + term(13, 40)).mul_scalar(-0.25).reshape([1, 1]);
+        agree(&[x.clone()], Cpu::cross_entropy(x.clone(), &scaled, &starts).reshape([1, 1]), stock);
+    }
+}

@@ -58,4 +58,14 @@ mod tests {
         let p = softmax(&[1000.0, -1000.0, 0.0, 0.0]);
         assert_eq!(p, vec![1.0, 0.0, 0.0, 1.0]);
     }
+
+    #[test]
+    fn the_residual_is_the_gradient() {
+        use crate::kernels::finite_difference::{check, normal};
+        let starts = [0, 5, 18];
+        let logits = normal(1, 36);
+        let targets: Vec<f32> = starts.windows(2).flat_map(|w| softmax(&normal(w[1] as u64, 2 * (w[1] - w[0])))).collect();
+        let gradient: Vec<f32> = cross_entropy(&logits, &targets, &starts).1.iter().map(|r| r / 4.0).collect();
+        check("logits", &logits, &gradient, 3e-2, 5e-3, |l| f64::from(cross_entropy(l, &targets, &starts).0));
+    }
 }

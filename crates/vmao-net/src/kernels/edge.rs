@@ -84,3 +84,49 @@ pub(crate) fn norm_relu_backward(features: &[f32], weight: &[f32], edges: &Edges
     dw.extend(dw_features);
     [dfeatures, dw, gradient.gain, gradient.bias]
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::kernels::finite_difference::{check, dot, normal};
+    use crate::kernels::linear;
+    use vmao_core::random::Stream;
+
+    const TABLE: usize = 71;
+    const ROWS: usize = 2 * BLOCK + 41;
+    const INPUTS: usize = 5;
+    const CHANNELS: usize = 7;
+
+    fn edges() -> Edges {
+        let mut s = Stream::new(4, &[]);
+        let sources = (0..ROWS).map(|_| s.index(TABLE) as u32).collect();
+        Edges { picks: Picks::new(sources, TABLE), offsets: normal(6, ROWS * 3) }
+    }
+
+    #[test]
+    fn the_product_before_the_gather_equals_the_product_of_the_grouped_rows() {
+        let (f, w, edges) = (normal(1, TABLE * INPUTS), normal(2, (INPUTS + 3) * CHANNELS), edges());
+        let (gain, bias) = (normal(3, CHANNELS), normal(4, CHANNELS));
+        let gathered = edges.picks.gather(&f, INPUTS);
+        let mut rows = Vec::new();
+        for (offset, feature) in edges.offsets.chunks(3).zip(gathered.chunks(INPUTS)) {
+            rows.extend(offset.iter().chain(feature));
+        }
+        let (fused, _) = norm_relu(&f, &w, &gain, &bias, &edges);
+        let (plain, _) = linear::norm_relu(&rows, &w, &gain, &bias);
+        assert!(fused.iter().zip(&plain).all(|(a, b)| (a - b).abs() < 1e-4));
+        assert!(fused.iter().any(|&y| y > 0.5));
+    }
+
+    #[test]
+    fn gradients_match_finite_differences() {
+        let (f, w, edges) = (normal(1, TABLE * INPUTS), normal(2, (INPUTS + 3) * CHANNELS), edges());
+        let (gain, bias, weight) = (normal(3, CHANNELS), normal(4, CHANNELS), normal(5, ROWS * CHANNELS));
+        let (_, tape) = norm_relu(&f, &w, &gain, &bias, &edges);
+        let [df, dw, dg, db] = norm_relu_backward(&f, &w, &edges, &tape, &weight);
+        check("features", &f, &df, 2e-3, 0.02, |f| dot(&norm_relu(f, &w, &gain, &bias, &edges).0, &weight));
+        check("W", &w, &dw, 2e-3, 0.02, |w| dot(&norm_relu(&f, w, &gain, &bias, &edges).0, &weight));
+        check("gain", &gain, &dg, 2e-3, 0.02, |gain| dot(&norm_relu(&f, &w, gain, &bias, &edges).0, &weight));
+        check("bias", &bias, &db, 5e-4, 0.02, |bias| dot(&norm_relu(&f, &w, &gain, bias, &edges).0, &weight));
+    }
+}

@@ -91,3 +91,51 @@ pub(crate) fn linear_backward(x: &[f32], weight: &[f32], dy: &[f32], channels: u
     let db = dw.split_off(weight.len());
     [dx, dw, db]
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::kernels::finite_difference::{check, dot, normal};
+
+    // Three blocks of rows, the last not full; no two sizes equal.
+    const ROWS: usize = 2 * BLOCK + 41;
+    const INPUTS: usize = 5;
+    const CHANNELS: usize = 7;
+
+    #[test]
+    fn normalised_outputs_have_the_asked_mean_and_deviation_before_the_relu() {
+        let (x, w) = (normal(1, ROWS * INPUTS), normal(2, INPUTS * CHANNELS));
+        // With a bias of 30 deviations nothing is cut off.
+        let (y, tape) = norm_relu(&x, &w, &[2.0; CHANNELS], &[60.0; CHANNELS]);
+        for c in 0..CHANNELS {
+            let channel: Vec<f64> = y.iter().skip(c).step_by(CHANNELS).map(|&v| f64::from(v)).collect();
+            let mean = channel.iter().sum::<f64>() / ROWS as f64;
+            let variance = channel.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / ROWS as f64;
+            assert!((mean - 60.0).abs() < 1e-3 && (variance - 4.0).abs() < 1e-3, "{mean} {variance}");
+            let z: Vec<f64> = tape.z.iter().skip(c).step_by(CHANNELS).map(|&v| f64::from(v)).collect();
+            assert!((z.iter().sum::<f64>() / ROWS as f64 - f64::from(tape.moments.mean[c])).abs() < 1e-5);
+        }
+    }
+
+    #[test]
+    fn gradients_of_the_normalised_layer_match_finite_differences() {
+        let (x, w) = (normal(1, ROWS * INPUTS), normal(2, INPUTS * CHANNELS));
+        let (gain, bias, weight) = (normal(3, CHANNELS), normal(4, CHANNELS), normal(5, ROWS * CHANNELS));
+        let (_, tape) = norm_relu(&x, &w, &gain, &bias);
+        let [dx, dw, dg, db] = norm_relu_backward(&x, &w, &tape, &weight);
+        check("x", &x, &dx, 2e-3, 0.02, |x| dot(&norm_relu(x, &w, &gain, &bias).0, &weight));
+        check("W", &w, &dw, 2e-3, 0.02, |w| dot(&norm_relu(&x, w, &gain, &bias).0, &weight));
+        check("gain", &gain, &dg, 2e-3, 0.02, |gain| dot(&norm_relu(&x, &w, gain, &bias).0, &weight));
+        check("bias", &bias, &db, 5e-4, 0.02, |bias| dot(&norm_relu(&x, &w, &gain, bias).0, &weight));
+    }
+
+    #[test]
+    fn gradients_of_the_plain_layer_match_finite_differences() {
+        let (x, w, b) = (normal(1, ROWS * INPUTS), normal(2, INPUTS * CHANNELS), normal(3, CHANNELS));
+        let weight = normal(5, ROWS * CHANNELS);
+        let [dx, dw, db] = linear_backward(&x, &w, &weight, CHANNELS);
+        check("x", &x, &dx, 1e-1, 1e-3, |x| dot(&linear(x, &w, &b, CHANNELS), &weight));
+        check("W", &w, &dw, 1e-1, 1e-3, |w| dot(&linear(&x, w, &b, CHANNELS), &weight));
+        check("b", &b, &db, 1e-1, 1e-3, |b| dot(&linear(&x, &w, b, CHANNELS), &weight));
+    }
+}

@@ -11,3 +11,6 @@ pub(crate) mod linear;
 pub(crate) mod matmul;
 pub(crate) mod max_pool;
 pub(crate) mod norm;
+
+#[cfg(test)]
+pub(crate) mod finite_difference;

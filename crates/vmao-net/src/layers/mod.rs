@@ -1,5 +1,7 @@
 //! The layers of the network: each is declared once, trained on burn and predicted on plain slices.
 
+#[cfg(test)]
+mod closed_form;
 mod dense;
 mod norm_linear;
 mod set_abstraction;
