@@ -47,6 +47,9 @@ impl Prepared {
     }
 }
 
+/// An example with its points and colours as augmented for one step.
+pub(crate) type Member<'a> = (&'a Prepared, Vec<[f32; 3]>, Vec<[f32; 3]>);
+
 /// Clouds one after the other, with all neighbour pairs in rows of the whole batch.
 #[derive(Debug)]
 pub(crate) struct Batch {
@@ -69,8 +72,8 @@ pub(crate) struct Batch {
 }
 
 impl Batch {
-    /// Puts together `members`, each with its points and colours as augmented.
-    pub(crate) fn new(members: &[(&Prepared, Vec<[f32; 3]>, Vec<[f32; 3]>)], config: &NetworkConfig) -> Self {
+    /// Puts together `members`.
+    pub(crate) fn new(members: &[Member<'_>], config: &NetworkConfig) -> Self {
         let (mut rows, mut posterior, mut targets, mut starts) = (Vec::new(), Vec::new(), Vec::new(), vec![0]);
         for (prepared, points, colors) in members {
             let own = features(points, colors, config);

@@ -98,11 +98,11 @@ impl Cvae {
             Tensor::<B, 2>::from_data(TensorData::new(values, [rows, columns]), device)
         };
         let features = constant(batch.features.clone(), FEATURES);
-        let scene = encode(&self.scene, pass, features.clone(), batch);
+        let scene = encode(&self.scene, pass, &features, batch);
         let mut kl = None;
         let latent = self.posterior.as_ref().map(|posterior| {
             let (mean, log_variance) =
-                posterior.forward(pass, batch, constant(batch.posterior_features.clone(), FEATURES + FINGERS));
+                posterior.forward(pass, batch, &constant(batch.posterior_features.clone(), FEATURES + FINGERS));
             kl = Some(divergence(mean.clone(), log_variance.clone()).div_scalar(batch.clouds as f32));
             mean + log_variance.mul_scalar(0.5).exp() * constant(noise, self.latent_size)
         });
@@ -119,7 +119,7 @@ impl Cvae {
             }
             coarse = layer.forward(pass, coarse, skip, &batch.up[fine]);
         }
-        let hidden = self.head.forward(pass, coarse);
+        let hidden = self.head.forward(pass, coarse, 1);
         let logits = self.logits.forward(pass, hidden);
         Terms { reconstruction: B::cross_entropy(logits, &batch.targets, &batch.starts), kl }
     }
@@ -131,7 +131,7 @@ impl Posterior {
         &self,
         pass: &mut Pass<B>,
         batch: &Batch,
-        features: Tensor<B, 2>,
+        features: &Tensor<B, 2>,
     ) -> (Tensor<B, 2>, Tensor<B, 2>) {
         let mut levels = encode(&self.encoder, pass, features, batch);
         let top = levels.remove(levels.len() - 1);
@@ -146,7 +146,7 @@ impl Posterior {
 fn encode<B: PointBackend>(
     layers: &[SetAbstraction],
     pass: &mut Pass<B>,
-    features: Tensor<B, 2>,
+    features: &Tensor<B, 2>,
     batch: &Batch,
 ) -> Vec<Tensor<B, 2>> {
     let mut out: Vec<Tensor<B, 2>> = Vec::with_capacity(layers.len());

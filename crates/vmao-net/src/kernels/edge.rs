@@ -6,7 +6,7 @@
 use super::blocks::{BLOCK, add_in_order, narrow};
 use super::gather::Picks;
 use super::linear::{linear, linear_backward};
-use super::norm::{Gradient, Moments, Tape, accumulate, affine, affine_relu};
+use super::norm::{Gradient, Moments, Tape, accumulate};
 use rayon::prelude::*;
 
 /// Neighbour pairs: which feature row each grouped row takes, and where that source lies from its centre.
@@ -30,8 +30,17 @@ pub(crate) fn add_offsets(z: &mut [f32], offsets: &[f32], weight: &[f32], channe
     }
 }
 
-/// y = relu(bn([offset, features[source]] W)); `features` table rows × inputs, `weight` (3 + inputs) × channels.
-pub(crate) fn norm_relu(features: &[f32], weight: &[f32], gain: &[f32], bias: &[f32], edges: &Edges) -> (Vec<f32>, Tape) {
+/// y = relu(bn([offset, features[source]] W)) and the largest of every `pool` rows.
+///
+/// `features` table rows × inputs, `weight` (3 + inputs) × channels, returns groups × channels.
+pub(crate) fn norm_relu(
+    features: &[f32],
+    weight: &[f32],
+    gain: &[f32],
+    bias: &[f32],
+    edges: &Edges,
+    pool: usize,
+) -> (Vec<f32>, Tape) {
     let channels = gain.len();
     let table = linear(features, &weight[3 * channels..], &[], channels);
     let rows = edges.picks.sources.len();
@@ -51,23 +60,20 @@ pub(crate) fn norm_relu(features: &[f32], weight: &[f32], gain: &[f32], bias: &[
         })
         .collect();
     let moments = Moments::from_sums(&add_in_order(&partials, 2 * channels), rows);
-    let (scale, shift) = affine(&moments, gain, bias);
-    let y = affine_relu(&z, &scale, &shift);
-    (y, Tape { z, moments, gain: gain.to_vec(), bias: bias.to_vec() })
+    Tape::new(z, moments, gain, bias, pool)
 }
 
 /// Gradients of [`norm_relu`] by features, W, γ, β.
 pub(crate) fn norm_relu_backward(features: &[f32], weight: &[f32], edges: &Edges, tape: &Tape, dy: &[f32]) -> [Vec<f32>; 4] {
     let gradient = Gradient::new(tape, dy);
-    let channels = tape.gain.len();
-    let mut dz = vec![0.0; dy.len()];
+    let channels = tape.channels();
+    let mut dz = vec![0.0; edges.picks.sources.len() * channels];
     let partials: Vec<Vec<f32>> = dz
         .par_chunks_mut(BLOCK * channels)
-        .zip(dy.par_chunks(BLOCK * channels))
         .zip(edges.offsets.par_chunks(BLOCK * 3))
         .enumerate()
-        .map(|(block, ((dz, dy), offsets))| {
-            gradient.dz(block * BLOCK, dy, dz);
+        .map(|(block, (dz, offsets))| {
+            gradient.dz(block * BLOCK, dz);
             let mut dw = vec![0.0; 3 * channels];
             for (dz, o) in dz.chunks_exact(channels).zip(offsets.chunks_exact(3)) {
                 for (axis, &o) in o.iter().enumerate() {
@@ -93,7 +99,7 @@ mod tests {
     use vmao_core::random::Stream;
 
     const TABLE: usize = 71;
-    const ROWS: usize = 2 * BLOCK + 41;
+    const ROWS: usize = 2 * BLOCK + 41; // 7 · 79
     const INPUTS: usize = 5;
     const CHANNELS: usize = 7;
 
@@ -112,21 +118,23 @@ mod tests {
         for (offset, feature) in edges.offsets.chunks(3).zip(gathered.chunks(INPUTS)) {
             rows.extend(offset.iter().chain(feature));
         }
-        let (fused, _) = norm_relu(&f, &w, &gain, &bias, &edges);
-        let (plain, _) = linear::norm_relu(&rows, &w, &gain, &bias);
+        let (fused, _) = norm_relu(&f, &w, &gain, &bias, &edges, 1);
+        let (plain, _) = linear::norm_relu(&rows, &w, &gain, &bias, 1);
         assert!(fused.iter().zip(&plain).all(|(a, b)| (a - b).abs() < 1e-4));
         assert!(fused.iter().any(|&y| y > 0.5));
     }
 
     #[test]
     fn gradients_match_finite_differences() {
-        let (f, w, edges) = (normal(1, TABLE * INPUTS), normal(2, (INPUTS + 3) * CHANNELS), edges());
-        let (gain, bias, weight) = (normal(3, CHANNELS), normal(4, CHANNELS), normal(5, ROWS * CHANNELS));
-        let (_, tape) = norm_relu(&f, &w, &gain, &bias, &edges);
-        let [df, dw, dg, db] = norm_relu_backward(&f, &w, &edges, &tape, &weight);
-        check("features", &f, &df, 2e-3, 0.02, |f| dot(&norm_relu(f, &w, &gain, &bias, &edges).0, &weight));
-        check("W", &w, &dw, 2e-3, 0.02, |w| dot(&norm_relu(&f, w, &gain, &bias, &edges).0, &weight));
-        check("gain", &gain, &dg, 2e-3, 0.02, |gain| dot(&norm_relu(&f, &w, gain, &bias, &edges).0, &weight));
-        check("bias", &bias, &db, 5e-4, 0.02, |bias| dot(&norm_relu(&f, &w, &gain, bias, &edges).0, &weight));
+        for pool in [1, 7] {
+            let (f, w, edges) = (normal(1, TABLE * INPUTS), normal(2, (INPUTS + 3) * CHANNELS), edges());
+            let (gain, bias, weight) = (normal(3, CHANNELS), normal(4, CHANNELS), normal(5, ROWS / pool * CHANNELS));
+            let (_, tape) = norm_relu(&f, &w, &gain, &bias, &edges, pool);
+            let [df, dw, dg, db] = norm_relu_backward(&f, &w, &edges, &tape, &weight);
+            check("features", &f, &df, 1e-3, 0.02, |f| dot(&norm_relu(f, &w, &gain, &bias, &edges, pool).0, &weight));
+            check("W", &w, &dw, 1e-3, 0.02, |w| dot(&norm_relu(&f, w, &gain, &bias, &edges, pool).0, &weight));
+            check("gain", &gain, &dg, 1e-3, 0.02, |gain| dot(&norm_relu(&f, &w, gain, &bias, &edges, pool).0, &weight));
+            check("bias", &bias, &db, 5e-4, 0.02, |bias| dot(&norm_relu(&f, &w, &gain, bias, &edges, pool).0, &weight));
+        }
     }
 }

@@ -2,11 +2,11 @@
 
 use super::blocks::{BLOCK, add_in_order, narrow};
 use super::matmul::{View, Write, product};
-use super::norm::{Gradient, Moments, Tape, accumulate, affine, affine_relu};
+use super::norm::{Gradient, Moments, Tape, accumulate};
 use rayon::prelude::*;
 
-/// y = relu(bn(x W)); `x` rows × inputs, `weight` inputs × channels, returns rows × channels.
-pub(crate) fn norm_relu(x: &[f32], weight: &[f32], gain: &[f32], bias: &[f32]) -> (Vec<f32>, Tape) {
+/// y = relu(bn(x W)) and the largest of every `pool` rows; `x` rows × inputs, `weight` inputs × channels, returns groups × channels.
+pub(crate) fn norm_relu(x: &[f32], weight: &[f32], gain: &[f32], bias: &[f32], pool: usize) -> (Vec<f32>, Tape) {
     let channels = gain.len();
     let inputs = weight.len() / channels;
     let rows = x.len() / inputs;
@@ -22,26 +22,23 @@ pub(crate) fn norm_relu(x: &[f32], weight: &[f32], gain: &[f32], bias: &[f32]) -
         })
         .collect();
     let moments = Moments::from_sums(&add_in_order(&partials, 2 * channels), rows);
-    let (scale, shift) = affine(&moments, gain, bias);
-    let y = affine_relu(&z, &scale, &shift);
-    (y, Tape { z, moments, gain: gain.to_vec(), bias: bias.to_vec() })
+    Tape::new(z, moments, gain, bias, pool)
 }
 
 /// Gradients of [`norm_relu`] by x, W, γ, β.
 pub(crate) fn norm_relu_backward(x: &[f32], weight: &[f32], tape: &Tape, dy: &[f32]) -> [Vec<f32>; 4] {
     let gradient = Gradient::new(tape, dy);
-    let channels = tape.gain.len();
+    let channels = tape.channels();
     let inputs = weight.len() / channels;
     let mut dx = vec![0.0; x.len()];
     let partials: Vec<Vec<f32>> = dx
         .par_chunks_mut(BLOCK * inputs)
         .zip(x.par_chunks(BLOCK * inputs))
-        .zip(dy.par_chunks(BLOCK * channels))
         .enumerate()
-        .map(|(block, ((dx, x), dy))| {
+        .map(|(block, (dx, x))| {
             let rows = x.len() / inputs;
-            let mut dz = vec![0.0; dy.len()];
-            gradient.dz(block * BLOCK, dy, &mut dz);
+            let mut dz = vec![0.0; rows * channels];
+            gradient.dz(block * BLOCK, &mut dz);
             product(dx, Write::Replace, View::new(&dz, rows, channels), View::new(weight, inputs, channels).transposed());
             let mut dw = vec![0.0; weight.len()];
             product(&mut dw, Write::Replace, View::new(x, rows, inputs).transposed(), View::new(&dz, rows, channels));
@@ -106,27 +103,32 @@ mod tests {
     fn normalised_outputs_have_the_asked_mean_and_deviation_before_the_relu() {
         let (x, w) = (normal(1, ROWS * INPUTS), normal(2, INPUTS * CHANNELS));
         // With a bias of 30 deviations nothing is cut off.
-        let (y, tape) = norm_relu(&x, &w, &[2.0; CHANNELS], &[60.0; CHANNELS]);
+        let (y, tape) = norm_relu(&x, &w, &[2.0; CHANNELS], &[60.0; CHANNELS], 1);
         for c in 0..CHANNELS {
             let channel: Vec<f64> = y.iter().skip(c).step_by(CHANNELS).map(|&v| f64::from(v)).collect();
             let mean = channel.iter().sum::<f64>() / ROWS as f64;
             let variance = channel.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / ROWS as f64;
             assert!((mean - 60.0).abs() < 1e-3 && (variance - 4.0).abs() < 1e-3, "{mean} {variance}");
-            let z: Vec<f64> = tape.z.iter().skip(c).step_by(CHANNELS).map(|&v| f64::from(v)).collect();
+            let z: Vec<f64> =
+                (0..ROWS).map(|r| (0..INPUTS).map(|k| f64::from(x[r * INPUTS + k] * w[k * CHANNELS + c])).sum()).collect();
             assert!((z.iter().sum::<f64>() / ROWS as f64 - f64::from(tape.moments.mean[c])).abs() < 1e-5);
         }
     }
 
     #[test]
     fn gradients_of_the_normalised_layer_match_finite_differences() {
-        let (x, w) = (normal(1, ROWS * INPUTS), normal(2, INPUTS * CHANNELS));
-        let (gain, bias, weight) = (normal(3, CHANNELS), normal(4, CHANNELS), normal(5, ROWS * CHANNELS));
-        let (_, tape) = norm_relu(&x, &w, &gain, &bias);
-        let [dx, dw, dg, db] = norm_relu_backward(&x, &w, &tape, &weight);
-        check("x", &x, &dx, 2e-3, 0.02, |x| dot(&norm_relu(x, &w, &gain, &bias).0, &weight));
-        check("W", &w, &dw, 2e-3, 0.02, |w| dot(&norm_relu(&x, w, &gain, &bias).0, &weight));
-        check("gain", &gain, &dg, 2e-3, 0.02, |gain| dot(&norm_relu(&x, &w, gain, &bias).0, &weight));
-        check("bias", &bias, &db, 5e-4, 0.02, |bias| dot(&norm_relu(&x, &w, &gain, bias).0, &weight));
+        // 3 divides the rows but not a block, so groups lie across blocks.
+        for pool in [1, 3] {
+            let rows = ROWS / 3 * 3;
+            let (x, w) = (normal(1, rows * INPUTS), normal(2, INPUTS * CHANNELS));
+            let (gain, bias, weight) = (normal(3, CHANNELS), normal(4, CHANNELS), normal(5, rows / pool * CHANNELS));
+            let (_, tape) = norm_relu(&x, &w, &gain, &bias, pool);
+            let [dx, dw, dg, db] = norm_relu_backward(&x, &w, &tape, &weight);
+            check("x", &x, &dx, 2e-3, 0.02, |x| dot(&norm_relu(x, &w, &gain, &bias, pool).0, &weight));
+            check("W", &w, &dw, 1e-3, 0.02, |w| dot(&norm_relu(&x, w, &gain, &bias, pool).0, &weight));
+            check("gain", &gain, &dg, 1e-3, 0.02, |gain| dot(&norm_relu(&x, &w, gain, &bias, pool).0, &weight));
+            check("bias", &bias, &db, 5e-4, 0.02, |bias| dot(&norm_relu(&x, &w, &gain, bias, pool).0, &weight));
+        }
     }
 
     #[test]

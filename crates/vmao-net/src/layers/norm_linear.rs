@@ -35,16 +35,24 @@ impl NormLinear {
         }
     }
 
-    /// Training: rows × inputs → rows × channels.
-    pub(crate) fn forward<B: PointBackend>(&self, pass: &mut Pass<B>, x: Tensor<B, 2>) -> Tensor<B, 2> {
-        let (y, moments) = B::linear_norm_relu(x, pass.get(self.weight), pass.get(self.gain), pass.get(self.bias));
+    /// Training: rows × inputs → rows × channels, or the largest of every `pool` rows.
+    pub(crate) fn forward<B: PointBackend>(&self, pass: &mut Pass<B>, x: Tensor<B, 2>, pool: usize) -> Tensor<B, 2> {
+        let (weight, gain, bias) = (pass.get(self.weight), pass.get(self.gain), pass.get(self.bias));
+        let (y, moments) = B::linear_norm_relu(x, weight, gain, bias, pool);
         pass.moments.push((self.mean, self.variance, moments));
         y
     }
 
-    /// Training, on [offset, x of the source] rows: table rows × (inputs − 3) → edges × channels.
-    pub(crate) fn forward_edges<B: PointBackend>(&self, pass: &mut Pass<B>, x: Tensor<B, 2>, edges: &Arc<Edges>) -> Tensor<B, 2> {
-        let (y, moments) = B::edge_norm_relu(x, pass.get(self.weight), pass.get(self.gain), pass.get(self.bias), edges);
+    /// Training, on [offset, x of the source] rows: table rows × (inputs − 3) → edges × channels, or the largest of every `pool`.
+    pub(crate) fn forward_edges<B: PointBackend>(
+        &self,
+        pass: &mut Pass<B>,
+        x: Tensor<B, 2>,
+        edges: &Arc<Edges>,
+        pool: usize,
+    ) -> Tensor<B, 2> {
+        let (weight, gain, bias) = (pass.get(self.weight), pass.get(self.gain), pass.get(self.bias));
+        let (y, moments) = B::edge_norm_relu(x, weight, gain, bias, edges, pool);
         pass.moments.push((self.mean, self.variance, moments));
         y
     }

@@ -54,7 +54,7 @@ impl SetUpConv {
         skip.insert(0, pooled);
         let mut y = Tensor::cat(skip, 1);
         for layer in &self.refine {
-            y = layer.forward(pass, y);
+            y = layer.forward(pass, y, 1);
         }
         assert_eq!(y.dims(), [fine, self.channels], "one row for each fine point");
         y

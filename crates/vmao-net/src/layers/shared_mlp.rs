@@ -34,11 +34,13 @@ impl GroupedMlp {
         edges: &Arc<Edges>,
         k: usize,
     ) -> Tensor<B, 2> {
-        let mut y = self.first.forward_edges(pass, x, edges);
-        for layer in &self.rest {
-            y = layer.forward(pass, y);
+        // The maximum is taken inside the last layer: its rows are never written out.
+        let pool = |last: bool| if last { k } else { 1 };
+        let mut y = self.first.forward_edges(pass, x, edges, pool(self.rest.is_empty()));
+        for (i, layer) in self.rest.iter().enumerate() {
+            y = layer.forward(pass, y, pool(i + 1 == self.rest.len()));
         }
-        B::max_pool(y, k)
+        y
     }
 
     /// Prediction.
