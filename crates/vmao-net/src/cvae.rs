@@ -1,0 +1,172 @@
+//! The conditional variational autoencoder of the supplement's Figure 2, and its deterministic sibling without latent code.
+//!
+//! Scene encoder → coarsest features (+ z) → set up-convolutions with skip features → two logits for every point. In training
+//! z comes from the posterior encoder, which also sees the label maps: L = H(p, p̂) + β KL(q(z | scene, maps) ‖ N(0, I)).
+
+use crate::batch::Batch;
+use crate::cloud::FEATURES;
+use crate::config::{LatentPlacement, ModelKind, NetworkConfig};
+use crate::kernels::cross_entropy::FINGERS;
+use crate::layers::{NormLinear, Pass, PlainLinear, SetAbstraction, SetUpConv};
+use crate::parameters::Layout;
+use crate::tape::PointBackend;
+use burn::tensor::{Tensor, TensorData};
+
+/// Largest size of a log variance: beyond it the divergence overflows before it says anything.
+pub(crate) const LOG_VARIANCE_LIMIT: f32 = 10.0;
+
+/// The layers of one network.
+#[derive(Debug)]
+pub(crate) struct Cvae {
+    pub(crate) scene: Vec<SetAbstraction>,
+    pub(crate) posterior: Option<Posterior>,
+    /// Coarsest first.
+    pub(crate) decoder: Vec<SetUpConv>,
+    pub(crate) head: NormLinear,
+    pub(crate) logits: PlainLinear,
+    pub(crate) placement: LatentPlacement,
+    latent_size: usize,
+}
+
+/// q(z | scene, maps): an encoder of its own and the two linear maps to mean and log variance.
+#[derive(Debug)]
+pub(crate) struct Posterior {
+    pub(crate) encoder: Vec<SetAbstraction>,
+    pub(crate) mean: PlainLinear,
+    pub(crate) log_variance: PlainLinear,
+}
+
+/// The terms of the objective over one batch.
+#[derive(Debug)]
+pub(crate) struct Terms<B: PointBackend> {
+    /// Cross entropy, mean over clouds and fingers.
+    pub(crate) reconstruction: Tensor<B, 1>,
+    /// KL divergence, mean over clouds; none without latent code.
+    pub(crate) kl: Option<Tensor<B, 1>>,
+}
+
+impl Cvae {
+    /// Declares the layers; the configuration must be valid.
+    pub(crate) fn new(layout: &mut Layout, kind: ModelKind, config: &NetworkConfig) -> Self {
+        let encoder = |layout: &mut Layout, name: &str, mut inputs: usize| {
+            let mut layers = Vec::with_capacity(config.abstraction.len());
+            for (i, level) in config.abstraction.iter().enumerate() {
+                let layer = SetAbstraction::new(layout, &format!("{name}.abstraction.{i}"), inputs, level);
+                inputs = layer.channels();
+                layers.push(layer);
+            }
+            layers
+        };
+        let scene = encoder(layout, "scene", FEATURES);
+        let top = scene[scene.len() - 1].channels();
+        let posterior = (kind == ModelKind::Vmao).then(|| Posterior {
+            encoder: encoder(layout, "posterior", FEATURES + FINGERS),
+            mean: PlainLinear::new(layout, "posterior.mean", top, config.latent_size),
+            log_variance: PlainLinear::new(layout, "posterior.log_variance", top, config.latent_size),
+        });
+        let latent = if kind == ModelKind::Vmao { config.latent_size } else { 0 };
+        let latent_in_skip = if config.latent_placement == LatentPlacement::EveryLevel { latent } else { 0 };
+        let mut coarse = top + latent;
+        let mut decoder = Vec::with_capacity(config.up_conv.len());
+        for (i, layer) in config.up_conv.iter().enumerate() {
+            let fine = scene.len() - 1 - i;
+            let skip = if fine == 0 { FEATURES } else { scene[fine - 1].channels() };
+            let layer = SetUpConv::new(layout, &format!("decoder.up_conv.{i}"), coarse, skip + latent_in_skip, layer);
+            coarse = layer.channels();
+            decoder.push(layer);
+        }
+        let head = NormLinear::new(layout, "decoder.head", coarse, config.head);
+        let logits = PlainLinear::new(layout, "decoder.logits", config.head, FINGERS);
+        Self { scene, posterior, decoder, head, logits, placement: config.latent_placement, latent_size: latent }
+    }
+
+    /// Z, or zero without latent code.
+    pub(crate) fn latent_size(&self) -> usize {
+        self.latent_size
+    }
+
+    /// Both terms of the objective; `noise` is clouds × Z standard normal numbers.
+    pub(crate) fn objective<B: PointBackend>(
+        &self,
+        pass: &mut Pass<B>,
+        batch: &Batch,
+        noise: Vec<f32>,
+        device: &B::Device,
+    ) -> Terms<B> {
+        let constant = |values: Vec<f32>, columns: usize| {
+            let rows = values.len() / columns;
+            Tensor::<B, 2>::from_data(TensorData::new(values, [rows, columns]), device)
+        };
+        let features = constant(batch.features.clone(), FEATURES);
+        let scene = encode(&self.scene, pass, &features, batch);
+        let mut kl = None;
+        let latent = self.posterior.as_ref().map(|posterior| {
+            let (mean, log_variance) =
+                posterior.forward(pass, batch, &constant(batch.posterior_features.clone(), FEATURES + FINGERS));
+            kl = Some(divergence(mean.clone(), log_variance.clone()).div_scalar(batch.clouds as f32));
+            mean + log_variance.mul_scalar(0.5).exp() * constant(noise, self.latent_size)
+        });
+        let levels = self.scene.len();
+        let mut coarse = scene[levels - 1].clone();
+        if let Some(z) = &latent {
+            coarse = Tensor::cat(vec![coarse, B::gather(z.clone(), &batch.owners[levels])], 1);
+        }
+        for (i, layer) in self.decoder.iter().enumerate() {
+            let fine = levels - 1 - i;
+            let mut skip = vec![if fine == 0 { features.clone() } else { scene[fine - 1].clone() }];
+            if let (Some(z), LatentPlacement::EveryLevel) = (&latent, self.placement) {
+                skip.push(B::gather(z.clone(), &batch.owners[fine]));
+            }
+            coarse = layer.forward(pass, coarse, skip, &batch.up[fine]);
+        }
+        let hidden = self.head.forward(pass, coarse, 1);
+        let logits = self.logits.forward(pass, hidden);
+        Terms { reconstruction: B::cross_entropy(logits, &batch.targets, &batch.starts), kl }
+    }
+}
+
+impl Posterior {
+    /// Mean and log variance, clouds × Z.
+    fn forward<B: PointBackend>(
+        &self,
+        pass: &mut Pass<B>,
+        batch: &Batch,
+        features: &Tensor<B, 2>,
+    ) -> (Tensor<B, 2>, Tensor<B, 2>) {
+        let mut levels = encode(&self.encoder, pass, features, batch);
+        let top = levels.remove(levels.len() - 1);
+        let [rows, _] = top.dims();
+        let pooled = B::max_pool(top, rows / batch.clouds);
+        let log_variance = self.log_variance.forward(pass, pooled.clone()).clamp(-LOG_VARIANCE_LIMIT, LOG_VARIANCE_LIMIT);
+        (self.mean.forward(pass, pooled), log_variance)
+    }
+}
+
+/// The features of every level, finest first, without the input.
+fn encode<B: PointBackend>(
+    layers: &[SetAbstraction],
+    pass: &mut Pass<B>,
+    features: &Tensor<B, 2>,
+    batch: &Batch,
+) -> Vec<Tensor<B, 2>> {
+    let mut out: Vec<Tensor<B, 2>> = Vec::with_capacity(layers.len());
+    for (layer, balls) in layers.iter().zip(&batch.down) {
+        let finer = out.last().cloned().unwrap_or_else(|| features.clone());
+        out.push(layer.forward(pass, finer, balls));
+    }
+    out
+}
+
+/// Σ over rows and columns of ½ (μ² + σ² − 1 − ln σ²): KL(N(μ, σ²) ‖ N(0, 1)) (Kingma & Welling 2014, appendix B).
+fn divergence<B: PointBackend>(mean: Tensor<B, 2>, log_variance: Tensor<B, 2>) -> Tensor<B, 1> {
+    (mean.powi_scalar(2) + log_variance.clone().exp() - log_variance - 1.0).sum().mul_scalar(0.5)
+}
+
+impl ModelKind {
+    /// The layers of this kind of network and the arrays they hold.
+    pub(crate) fn layers(self, config: &NetworkConfig) -> (Layout, Cvae) {
+        let mut layout = Layout::default();
+        let cvae = Cvae::new(&mut layout, self, config);
+        (layout, cvae)
+    }
+}
