@@ -1,4 +1,7 @@
-//! Records the commit that is built, without failing where there is none.
+//! Records the commit that is built, without failing where there is none, and finds the simulator library.
+
+#[path = "../../tools/rpath.rs"]
+mod rpath;
 
 use std::{path::Path, process::Command};
 
@@ -8,6 +11,7 @@ fn git(arguments: &[&str]) -> Option<String> {
 }
 
 fn main() {
+    rpath::main();
     println!("cargo::rerun-if-changed=build.rs");
     // A source archive unpacked inside some other repository must not take that one's commit.
     let ours = git(&["ls-files", "--error-unmatch", "build.rs"]).is_some();

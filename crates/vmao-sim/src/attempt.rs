@@ -417,7 +417,8 @@ impl<'a> Attempt<'a> {
         });
         let (index, seed, order, start, goal, grasps) = (self.index, self.seed, self.order, self.start, self.goal, self.grasps);
         let record = TrialRecord { index, seed, order, start, goal, grasps, outcome, detail, steps, final_errors: self.errors };
-        Trial { record, threshold_factor: self.factor, rollout }
+        let got_so_far = matches!(outcome, TrialOutcome::Success | TrialOutcome::Failed(FailureStage::Threshold));
+        Trial { record, threshold_factor: if got_so_far { self.factor } else { f64::INFINITY }, rollout }
     }
 }
 

@@ -9,7 +9,9 @@ use crate::{
 };
 use serde::{Deserialize, Serialize};
 use std::path::Path;
-use vmao_core::order::GraspOrder;
+use vmao_core::{catalogue::InstanceSet, order::GraspOrder, osc::OscGains};
+use vmao_net::{NetworkConfig, TrainingConfig};
+use vmao_sim::{CameraConfig, GoalConfig, GraspConfig, MotionConfig, SceneConfig, StartConfig, Thresholds, TrialConfig};
 
 /// The configuration shipped with the program.
 pub const SHIPPED: &str = include_str!("../../../configs/demo.toml");
@@ -33,15 +35,29 @@ pub struct Config {
     /// Who manipulates.
     pub robots: RobotsConfig,
     /// How a trial goes.
-    pub trial: TrialConfig,
+    pub trial: OrderConfig,
+    /// Placement of the arms and physics.
+    pub scene: SceneConfig,
+    /// Where objects start.
+    pub start: StartConfig,
     /// Where goals are drawn from.
     pub goal: GoalConfig,
     /// What counts as having reached a goal.
-    pub thresholds: ThresholdConfig,
+    pub thresholds: Thresholds,
+    /// What is seen.
+    pub cameras: CameraConfig,
+    /// How grasps are chosen.
+    pub grasp: GraspConfig,
+    /// How fast things move.
+    pub motion: MotionConfig,
+    /// The controller's gains.
+    pub osc: OscGains,
     /// Algorithm 1.
     pub explore: ExploreConfig,
-    /// The network and its training.
-    pub train: toml::Table,
+    /// The network.
+    pub network: NetworkConfig,
+    /// Its training.
+    pub train: TrainingConfig,
     /// The cells of the table.
     pub evaluate: EvaluateConfig,
 }
@@ -60,46 +76,14 @@ pub struct ObjectConfig {
 pub struct RobotsConfig {
     /// One arm each.
     pub names: Vec<String>,
-    /// How the arms stand around the table.
-    pub layout: String,
 }
 
 /// How a trial goes.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct TrialConfig {
+pub struct OrderConfig {
     /// The grasp order.
     pub order: GraspOrder,
-}
-
-/// Where goals are drawn from; each a [lowest, highest] pair, relative to the start.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct GoalConfig {
-    /// Upwards (m).
-    pub lift: [f64; 2],
-    /// Along a random horizontal direction (m).
-    pub sideways: [f64; 2],
-    /// About the vertical (degrees).
-    pub yaw_deg: [f64; 2],
-    /// About a random horizontal axis (degrees).
-    pub tilt_deg: [f64; 2],
-    /// Size of every joint's change (degrees).
-    pub joint_change_deg: [f64; 2],
-}
-
-/// What counts as having reached a goal.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct ThresholdConfig {
-    /// Of every part (m).
-    pub position: f64,
-    /// Of every part (degrees).
-    pub rotation_deg: f64,
-    /// Of every joint (degrees).
-    pub joint_deg: f64,
-    /// How long all must be met (s).
-    pub hold_seconds: f64,
 }
 
 /// Algorithm 1.
@@ -114,6 +98,8 @@ pub struct ExploreConfig {
     pub successes: u64,
     /// Trials at most.
     pub max_trials: u64,
+    /// Grasp orders, taken in turn by the trials; empty stands for `trial.order`.
+    pub orders: Vec<GraspOrder>,
 }
 
 /// The cells of the table.
@@ -124,6 +110,8 @@ pub struct EvaluateConfig {
     pub trials: u64,
     /// The grasp orders compared.
     pub orders: Vec<GraspOrder>,
+    /// Sizes of the object: those explored, or those kept back.
+    pub instances: InstanceSet,
     /// The methods compared.
     pub methods: Vec<Method>,
 }
@@ -158,27 +146,115 @@ impl Config {
         self.to_toml().map(|text| sha256_hex(text.as_bytes()))
     }
 
+    /// What the simulator needs to know of a trial.
+    pub fn trial_config(&self) -> TrialConfig {
+        TrialConfig {
+            start: self.start.clone(),
+            goal: self.goal.clone(),
+            thresholds: self.thresholds.clone(),
+            cameras: self.cameras.clone(),
+            grasp: self.grasp.clone(),
+            motion: self.motion.clone(),
+            osc: self.osc,
+        }
+    }
+
+    /// The orders that exploration takes in turn.
+    pub fn explored_orders(&self) -> Vec<GraspOrder> {
+        if self.explore.orders.is_empty() { vec![self.trial.order] } else { self.explore.orders.clone() }
+    }
+
     fn check(&self) -> Result<(), String> {
-        let Self { object, robots, trial: _, goal, thresholds, explore, train: _, evaluate } = self;
+        let Self { object, robots, scene, start, goal, thresholds, cameras, grasp, motion, osc, explore, evaluate, .. } = self;
         ensure(!object.name.is_empty(), "object.name", "an empty name", "a name of the catalogue")?;
         ensure(!robots.names.is_empty(), "robots.names", "no arms", "at least one")?;
+        within("scene.base_distance", scene.base_distance, 0.2, 2.0)?;
+        within("scene.base_spacing", scene.base_spacing, 0.2, 2.0)?;
+        within("scene.timestep", scene.timestep, 1e-4, 5e-3)?;
+        within("scene.friction_impedance_ratio", scene.friction_impedance_ratio, 1.0, 1000.0)?;
+        for (key, friction) in [
+            ("scene.pad_friction", scene.pad_friction),
+            ("scene.object_friction", scene.object_friction),
+            ("scene.table_friction", scene.table_friction),
+            ("scene.link_friction", scene.link_friction),
+        ] {
+            // Honest physics: nothing stickier than rubber on wood.
+            within(&format!("{key}.sliding"), friction.sliding, 0.0, 1.0)?;
+            within(&format!("{key}.torsional"), friction.torsional, 0.0, 0.003)?;
+            within(&format!("{key}.rolling"), friction.rolling, 0.0, 0.001)?;
+        }
+        within("start.half_width", start.half_width, 0.0, 1.0)?;
         range("goal.lift", goal.lift, 0.0, 2.0)?;
-        range("goal.sideways", goal.sideways, 0.0, 2.0)?;
-        range("goal.yaw_deg", goal.yaw_deg, -180.0, 180.0)?;
-        range("goal.tilt_deg", goal.tilt_deg, 0.0, 90.0)?;
-        range("goal.joint_change_deg", goal.joint_change_deg, 0.0, 360.0)?;
+        within("goal.sideways", goal.sideways, 0.0, 2.0)?;
+        within("goal.yaw_deg", goal.yaw_deg, 0.0, 180.0)?;
+        within("goal.tilt_deg", goal.tilt_deg, 0.0, 90.0)?;
+        within("goal.joint_change_share", goal.joint_change_share, 0.0, 1.0)?;
+        within("goal.joint_change_deg", goal.joint_change_deg, 0.0, 360.0)?;
         positive("thresholds.position", thresholds.position)?;
         positive("thresholds.rotation_deg", thresholds.rotation_deg)?;
         positive("thresholds.joint_deg", thresholds.joint_deg)?;
+        positive("thresholds.joint_m", thresholds.joint_m)?;
         within("thresholds.hold_seconds", thresholds.hold_seconds, 0.0, 60.0)?;
+        check_cameras(cameras)?;
+        check_control(grasp, motion, osc)?;
         positive("explore.radius", explore.radius)?;
         at_least_one("explore.round_size", explore.round_size)?;
         at_least_one("explore.successes", explore.successes)?;
         at_least_one("explore.max_trials", explore.max_trials)?;
         at_least_one("evaluate.trials", evaluate.trials)?;
         ensure(!evaluate.orders.is_empty(), "evaluate.orders", "no orders", "at least one")?;
-        ensure(!evaluate.methods.is_empty(), "evaluate.methods", "no methods", "at least one")
+        ensure(!evaluate.methods.is_empty(), "evaluate.methods", "no methods", "at least one")?;
+        self.network.validate().map_err(|error| format!("network: {error}"))?;
+        self.train.validate().map_err(|error| format!("train: {error}"))
     }
+}
+
+fn check_cameras(cameras: &CameraConfig) -> Result<(), String> {
+    within("cameras.count", cameras.count as f64, 2.0, 16.0)?;
+    within("cameras.width", cameras.width as f64, 16.0, 1024.0)?;
+    within("cameras.height", cameras.height as f64, 16.0, 1024.0)?;
+    within("cameras.field_of_view_deg", cameras.field_of_view_deg, 1.0, 150.0)?;
+    within("cameras.distance", cameras.distance, 0.1, 5.0)?;
+    ensure(!cameras.elevations.is_empty(), "cameras.elevations", "no heights", "at least one")?;
+    for &elevation in &cameras.elevations {
+        within("cameras.elevations", elevation, 0.01, 5.0)?;
+    }
+    within("cameras.workspace_half_width", cameras.workspace_half_width, 0.05, 2.0)?;
+    within("cameras.workspace_height", cameras.workspace_height, 0.05, 2.0)?;
+    within("cameras.points", cameras.points as f64, 64.0, 65_536.0)?;
+    within("cameras.table_share + cameras.robot_share", cameras.table_share + cameras.robot_share, 0.0, 1.0)?;
+    within("cameras.table_share", cameras.table_share, 0.0, 1.0)?;
+    within("cameras.robot_share", cameras.robot_share, 0.0, 1.0)
+}
+
+fn check_control(grasp: &GraspConfig, motion: &MotionConfig, osc: &OscGains) -> Result<(), String> {
+    within("grasp.approaches", grasp.approaches as f64, 1.0, 360.0)?;
+    within("grasp.standoff", grasp.standoff, 0.0, 0.5)?;
+    within("grasp.opening_margin", grasp.opening_margin, 0.0, 0.1)?;
+    within("grasp.table_clearance", grasp.table_clearance, 0.0, 0.1)?;
+    within("grasp.max_retreat", grasp.max_retreat, 0.0, 0.1)?;
+    within("grasp.plan_margin", grasp.plan_margin, 0.0, 0.1)?;
+    within("grasp.carry_margin", grasp.carry_margin, 0.0, 0.1)?;
+    within("grasp.shortlist", grasp.shortlist as f64, 1.0, 1000.0)?;
+    within("grasp.ik_candidates", grasp.ik_candidates as f64, 1.0, 100.0)?;
+    within("grasp.closing_share", grasp.closing_share, 0.0, 1.0)?;
+    within("grasp.closing_seconds", grasp.closing_seconds, 0.0, 10.0)?;
+    within("grasp.hold_force", grasp.hold_force, 0.0, 1000.0)?;
+    within("motion.velocity_share", motion.velocity_share, 0.01, 1.0)?;
+    within("motion.acceleration_share", motion.acceleration_share, 0.01, 1.0)?;
+    within("motion.approach_share", motion.approach_share, 0.01, 1.0)?;
+    positive("motion.object_speed", motion.object_speed)?;
+    positive("motion.object_turning_speed", motion.object_turning_speed)?;
+    within("motion.shortest_motion", motion.shortest_motion, 0.1, 60.0)?;
+    positive("motion.collision_force", motion.collision_force)?;
+    within("motion.waypoints", motion.waypoints as f64, 1.0, 1000.0)?;
+    positive("osc.position_stiffness", osc.position_stiffness)?;
+    positive("osc.rotation_stiffness", osc.rotation_stiffness)?;
+    positive("osc.damping_ratio", osc.damping_ratio)?;
+    within("osc.posture_stiffness", osc.posture_stiffness, 0.0, 1e4)?;
+    within("osc.singularity_damping", osc.singularity_damping, 0.0, 1.0)?;
+    positive("osc.max_position_error", osc.max_position_error)?;
+    positive("osc.max_rotation_error", osc.max_rotation_error)
 }
 
 fn ensure(holds: bool, key: &str, found: &str, expected: &str) -> Result<(), String> {
@@ -261,7 +337,8 @@ mod tests {
     fn values_out_of_range_are_refused_with_what_is_expected() {
         for (setting, message) in [
             ("goal.lift=[0.2, 0.1]", "configuration: goal.lift: [0.2, 0.1], expected [low, high] with 0 ≤ low ≤ high ≤ 2"),
-            ("goal.tilt_deg=[nan, 1.0]", "goal.tilt_deg: [NaN, 1], expected [low, high]"),
+            ("goal.tilt_deg=nan", "goal.tilt_deg: NaN, expected 0 to 90"),
+            ("scene.pad_friction.sliding=1.5", "scene.pad_friction.sliding: 1.5, expected 0 to 1"),
             ("thresholds.position=-0.1", "thresholds.position: -0.1, expected a positive finite number"),
             ("thresholds.joint_deg=inf", "thresholds.joint_deg: inf, expected a positive finite number"),
             ("explore.round_size=0", "explore.round_size: 0, expected at least 1"),

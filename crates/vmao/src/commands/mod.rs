@@ -3,8 +3,15 @@
 //! To add a command: a module here with its `clap::Args` (flatten [`CommonOptions`] into it) and
 //! `pub(super) fn run(arguments, &Session) -> Result<(), Failure>`, and its line in [`Command`] and in [`execute`].
 
+mod demo;
+mod evaluate;
+mod explore;
+mod object;
 mod ocao;
+mod report;
+mod scene;
 mod session;
+mod train;
 
 pub use session::{CommonOptions, Session};
 
@@ -27,6 +34,20 @@ const LONG_VERSION: &str = concat!(env!("CARGO_PKG_VERSION"), " (commit ", env!(
 
 #[derive(Debug, Subcommand)]
 enum Command {
+    /// The whole loop at laptop size: explore, train, evaluate, report
+    Demo(demo::DemoArguments),
+    /// The catalogue of objects
+    Object(object::ObjectArguments),
+    /// Algorithm 1: grow a label set from demonstrations, in physics
+    Explore(explore::ExploreArguments),
+    /// Train contact networks on an explored data set
+    Train(train::TrainArguments),
+    /// Success rates of trained models
+    Evaluate(evaluate::EvaluateArguments),
+    /// report.html of a run
+    Report(report::ReportArguments),
+    /// The simulated scene as MJCF
+    Scene(scene::SceneArguments),
     /// Goal poses of all parts and grippers from a root pose and joint positions (object-centric control)
     Ocao(ocao::OcaoArguments),
 }
@@ -49,8 +70,16 @@ pub fn main(arguments: impl IntoIterator<Item = OsString>) -> ExitCode {
 }
 
 fn execute(command: Command, command_line: &[String]) -> Result<(), Failure> {
+    let session = |common: &CommonOptions| Session::start(common, command_line);
     match command {
-        Command::Ocao(arguments) => ocao::run(&arguments, &Session::start(&arguments.common, command_line)?),
+        Command::Demo(arguments) => demo::run(&arguments, session(&arguments.common)?),
+        Command::Object(arguments) => object::run(&arguments, &session(arguments.action.common())?),
+        Command::Explore(arguments) => explore::run(&arguments, session(&arguments.common)?),
+        Command::Train(arguments) => train::run(&arguments, &session(&arguments.common)?),
+        Command::Evaluate(arguments) => evaluate::run(&arguments, session(&arguments.common)?),
+        Command::Report(arguments) => report::run(&arguments, &session(&arguments.common)?),
+        Command::Scene(arguments) => scene::run(&arguments, &session(&arguments.common)?),
+        Command::Ocao(arguments) => ocao::run(&arguments, &session(&arguments.common)?),
     }
 }
 

@@ -69,6 +69,18 @@ impl Session {
         })
     }
 
+    /// Changes the configuration by a command's own options; what is saved beside the output follows.
+    pub fn configure(&mut self, change: impl FnOnce(&mut Config)) -> Result<(), Failure> {
+        change(&mut self.config);
+        self.info.config_sha256 = self.config.sha256()?;
+        Ok(())
+    }
+
+    /// A pool of the threads asked for.
+    pub fn pool(&self) -> Result<rayon::ThreadPool, Failure> {
+        Ok(rayon::ThreadPoolBuilder::new().num_threads(self.workers).build()?)
+    }
+
     /// The output directory, `--out` or `default`: made if need be, with the configuration and `run.json` in it.
     pub fn output_directory(&self, default: &Path) -> Result<PathBuf, Failure> {
         let directory = self.out.as_deref().unwrap_or(default);

@@ -1,0 +1,60 @@
+//! `vmao demo`: the whole loop at laptop size: explore, train both models, evaluate both in both orders, report.
+
+use super::{CommonOptions, Session, evaluate::table};
+use crate::{
+    exploration::explore,
+    failure::Failure,
+    learning::{load, train_all},
+    output::{Layout, log, print},
+    run_report::write_report,
+};
+use serde::Serialize;
+use std::path::{Path, PathBuf};
+
+#[derive(Debug, clap::Args)]
+pub(super) struct DemoArguments {
+    #[command(flatten)]
+    pub(super) common: CommonOptions,
+}
+
+#[derive(Debug, Serialize)]
+struct Answer {
+    report: PathBuf,
+    results: PathBuf,
+}
+
+pub(super) fn run(_arguments: &DemoArguments, mut session: Session) -> Result<(), Failure> {
+    // The models are used in all the orders that are compared, so they must have seen all of them.
+    session.configure(|config| {
+        if config.explore.orders.is_empty() {
+            config.explore.orders.clone_from(&config.evaluate.orders);
+        }
+    })?;
+    let directory = session.output_directory(&unused(Path::new("runs/demo")))?;
+    let (results, report) = session.pool()?.install(|| -> Result<_, Failure> {
+        let (config, seed) = (&session.config, session.info.seed);
+        let (explored, records) = explore(config, seed, &directory.join("data"))?;
+        log(&format!("explored: {} of {} trials accepted", explored.successes, explored.trials));
+        let mut models = Vec::new();
+        for &method in &config.evaluate.methods {
+            let place = directory.join("models").join(method.name());
+            train_all(config, method, &records, seed, &place)?;
+            models.push(load(&place, config.robots.names.len())?);
+        }
+        let results = table(&session, models, &directory)?;
+        Ok((results, write_report(&directory)?))
+    })?;
+    match session.layout {
+        Layout::Line => session.print(&Answer { report, results: directory.join("results.json") }),
+        Layout::Indented => {
+            Ok(print(&format!("{}\n{}\n{}", results.table(), report.display(), directory.join("results.json").display()))?)
+        }
+    }
+}
+
+/// `path`, or the first of `path-2`, `path-3`, … that does not exist: no run overwrites another.
+fn unused(path: &Path) -> PathBuf {
+    let numbered =
+        |number: u32| if number == 1 { path.to_owned() } else { PathBuf::from(format!("{}-{number}", path.display())) };
+    (1..).map(numbered).find(|path| !path.exists()).unwrap_or_else(|| path.to_owned())
+}

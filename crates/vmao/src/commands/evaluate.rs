@@ -1,0 +1,74 @@
+//! `vmao evaluate`: cells of the table for trained models.
+
+use super::{CommonOptions, Session};
+use crate::{
+    evaluation::{Evaluation, save},
+    failure::{Failure, OrBadInput},
+    learning::{copy, load},
+    output::{Layout, print},
+    results::{Method, Results},
+};
+use std::path::{Path, PathBuf};
+use vmao_core::order::GraspOrder;
+
+#[derive(Debug, clap::Args)]
+pub(super) struct EvaluateArguments {
+    /// A checkpoint of `vmao train`, or a directory with `vmao` and `top1` in it
+    #[arg(long, value_name = "DIR")]
+    checkpoint: PathBuf,
+    /// The grasp orders, over the configuration's; may be repeated
+    #[arg(long = "order", value_name = "ORDER", value_parser = parse_order)]
+    orders: Vec<GraspOrder>,
+    /// Trials of each cell, over the configuration's
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..))]
+    trials: Option<u64>,
+    #[command(flatten)]
+    pub(super) common: CommonOptions,
+}
+
+fn parse_order(name: &str) -> Result<GraspOrder, String> {
+    let orders = [GraspOrder::Parallel, GraspOrder::SequentialParallel, GraspOrder::Sequential];
+    let found = orders.into_iter().find(|order| order.name() == name);
+    found.ok_or_else(|| format!("orders are: {}", orders.map(GraspOrder::name).join(", ")))
+}
+
+pub(super) fn run(arguments: &EvaluateArguments, mut session: Session) -> Result<(), Failure> {
+    session.configure(|config| {
+        config.evaluate.trials = arguments.trials.unwrap_or(config.evaluate.trials);
+        if !arguments.orders.is_empty() {
+            config.evaluate.orders.clone_from(&arguments.orders);
+        }
+    })?;
+    let grasps = session.config.robots.names.len();
+    let places: Vec<PathBuf> = [Method::Vmao, Method::Top1].map(|method| arguments.checkpoint.join(method.name())).into();
+    let mut places: Vec<PathBuf> = places.into_iter().filter(|place| place.is_dir()).collect();
+    if places.is_empty() {
+        places.push(arguments.checkpoint.clone());
+    }
+    let models = places.iter().map(|place| load(place, grasps)).collect::<Result<Vec<_>, _>>()?;
+    let directory = session.output_directory(Path::new("runs/evaluate"))?;
+    for (place, (method, _)) in places.iter().zip(&models) {
+        let kept = directory.join("models").join(method.name());
+        if place.canonicalize().or_bad_input()? != kept.canonicalize().unwrap_or_default() {
+            copy(place, &kept, grasps)?;
+        }
+    }
+    let results = session.pool()?.install(|| table(&session, models, &directory))?;
+    match session.layout {
+        Layout::Line => session.print(&results),
+        Layout::Indented => Ok(print(results.table().trim_end())?),
+    }
+}
+
+/// Runs the configured cells and writes their results.
+pub(super) fn table(
+    session: &Session,
+    models: Vec<(Method, crate::learned_contacts::LearnedContacts)>,
+    directory: &Path,
+) -> Result<Results, Failure> {
+    let evaluation = Evaluation::new(&session.config, session.info.seed, models)?;
+    let lines = evaluation.run();
+    let results = evaluation.results(&session.info, &lines);
+    save(directory, &lines, &results)?;
+    Ok(results)
+}

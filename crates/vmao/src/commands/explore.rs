@@ -1,0 +1,42 @@
+//! `vmao explore`: Algorithm 1 into a data set.
+
+use super::{CommonOptions, Session};
+use crate::{
+    dataset,
+    exploration::explore,
+    failure::{Failure, OrBadInput},
+};
+use std::path::Path;
+
+#[derive(Debug, clap::Args)]
+pub(super) struct ExploreArguments {
+    /// Successes wanted, over the configuration's
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..))]
+    successes: Option<u64>,
+    /// Trials at most, over the configuration's
+    #[arg(long, value_name = "M", value_parser = clap::value_parser!(u64).range(1..))]
+    max_trials: Option<u64>,
+    /// Go on with the data set that is there
+    #[arg(long)]
+    resume: bool,
+    #[command(flatten)]
+    pub(super) common: CommonOptions,
+}
+
+pub(super) fn run(arguments: &ExploreArguments, mut session: Session) -> Result<(), Failure> {
+    session.configure(|config| {
+        config.explore.successes = arguments.successes.unwrap_or(config.explore.successes);
+        config.explore.max_trials = arguments.max_trials.unwrap_or(config.explore.max_trials);
+    })?;
+    let directory = session.out.clone().unwrap_or_else(|| Path::new("runs/explore").to_owned());
+    let begun = directory.join("run.json").is_file();
+    if begun && arguments.resume {
+        session.info.check_same_run(&directory).or_bad_input()?;
+    } else if directory.is_dir() && !dataset::shards(&directory).or_bad_input()?.is_empty() {
+        let message = format!("{}: holds a data set, expected an empty directory; --resume goes on with it", directory.display());
+        return Err(Failure::bad_input(message));
+    }
+    session.output_directory(&directory)?;
+    let (explored, _) = session.pool()?.install(|| explore(&session.config, session.info.seed, &directory))?;
+    session.print(&explored)
+}

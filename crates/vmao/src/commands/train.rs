@@ -1,0 +1,64 @@
+//! `vmao train`: checkpoints from a data set.
+
+use super::{CommonOptions, Session};
+use crate::{
+    dataset,
+    failure::{Failure, OrBadInput},
+    learning::train_all,
+    results::Method,
+};
+use serde::Serialize;
+use std::path::{Path, PathBuf};
+
+#[derive(Debug, clap::Args)]
+pub(super) struct TrainArguments {
+    /// A data set written by `vmao explore`
+    #[arg(long, value_name = "DIR")]
+    data: PathBuf,
+    /// The contact model
+    #[arg(long, value_enum)]
+    model: Model,
+    #[command(flatten)]
+    pub(super) common: CommonOptions,
+}
+
+#[derive(Debug, Clone, Copy, clap::ValueEnum)]
+enum Model {
+    /// The generative model
+    Vmao,
+    /// The deterministic baseline
+    Top1,
+}
+
+#[derive(Debug, Serialize)]
+struct Answer {
+    checkpoint: PathBuf,
+    epochs: usize,
+    validation: Vec<Validation>,
+}
+
+#[derive(Debug, Serialize)]
+struct Validation {
+    grasp: usize,
+    reconstruction: Option<f32>,
+    kl: Option<f32>,
+}
+
+pub(super) fn run(arguments: &TrainArguments, session: &Session) -> Result<(), Failure> {
+    let method = match arguments.model {
+        Model::Vmao => Method::Vmao,
+        Model::Top1 => Method::Top1,
+    };
+    let records = dataset::load(&arguments.data).or_bad_input()?;
+    if records.is_empty() {
+        return Err(Failure::bad_input(format!("{}: no trials, expected a data set", arguments.data.display())));
+    }
+    let directory = session.output_directory(&Path::new("runs/train").join(method.name()))?;
+    let lines = session.pool()?.install(|| train_all(&session.config, method, &records, session.info.seed, &directory))?;
+    let last = |grasp: usize| lines.iter().rfind(|line| line.grasp == grasp);
+    let validation = (0..session.config.robots.names.len())
+        .filter_map(last)
+        .map(|line| Validation { grasp: line.grasp, reconstruction: line.validation_reconstruction, kl: line.validation_kl })
+        .collect();
+    session.print(&Answer { checkpoint: directory, epochs: session.config.train.epochs, validation })
+}

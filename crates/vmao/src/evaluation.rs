@@ -1,0 +1,134 @@
+//! The table: every method in every order on the same trials.
+
+use crate::config::Config;
+use crate::failure::Failure;
+use crate::learned_contacts::LearnedContacts;
+use crate::output::{progress_bar, write_whole};
+use crate::provenance::RunInfo;
+use crate::results::{Cell, Method, Results};
+use crate::scenes::scenes;
+use anyhow::Context;
+use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
+use std::io::Write;
+use std::path::Path;
+use vmao_core::order::GraspOrder;
+use vmao_core::outcome::TrialOutcome;
+use vmao_core::random::Stream;
+use vmao_sim::{Recording, Scene, Trial, run_trial, scene_of_trial};
+
+/// Names the stream that the seed of evaluation trials is drawn from, so that none of them was explored.
+const EVALUATION: u64 = 1 << 34;
+
+/// One line of `trials.jsonl`: a trial of the table.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct TrialLine {
+    /// The grasp order.
+    pub order: GraspOrder,
+    /// Who chose the contacts.
+    pub method: Method,
+    /// Number of the trial; the same number is the same scene and goal for every method.
+    pub index: u64,
+    /// How it ended.
+    pub outcome: TrialOutcome,
+    /// Why, if it failed.
+    pub detail: String,
+    /// Simulated steps.
+    pub steps: u64,
+    /// Largest position (m), rotation (rad) and joint error (rad or m) at the end.
+    pub final_errors: [f64; 3],
+    /// The factor on all thresholds at which it would have succeeded; none if it did not get so far.
+    pub threshold_factor: Option<f64>,
+}
+
+/// Everything that trials of the table run on.
+#[derive(Debug)]
+pub struct Evaluation<'a> {
+    config: &'a Config,
+    scenes: Vec<Scene>,
+    seed: u64,
+    methods: Vec<(Method, LearnedContacts)>,
+}
+
+impl<'a> Evaluation<'a> {
+    /// The table of this configuration and run seed, for these models.
+    pub fn new(config: &'a Config, run_seed: u64, methods: Vec<(Method, LearnedContacts)>) -> Result<Self, Failure> {
+        let mut stream = Stream::new(run_seed, &[EVALUATION]);
+        let seed = u64::from(stream.bits()) << 32 | u64::from(stream.bits());
+        Ok(Self { config, scenes: scenes(config, config.evaluate.instances)?, seed, methods })
+    }
+
+    /// The models of `method`, if they are here.
+    pub fn model(&self, method: Method) -> Option<&LearnedContacts> {
+        self.methods.iter().find(|(name, _)| *name == method).map(|(_, model)| model)
+    }
+
+    /// Runs one trial of the table; the same call gives the same trial, bit for bit.
+    pub fn trial(&self, order: GraspOrder, method: Method, index: u64, recording: Recording) -> Option<Trial> {
+        let scene = &self.scenes[scene_of_trial(self.seed, index, self.scenes.len())];
+        let model = self.model(method)?;
+        Some(run_trial(scene, &self.config.trial_config(), model, order, (self.seed, index), recording))
+    }
+
+    /// Runs every cell in the current rayon pool; lines by order, method, index.
+    pub fn run(&self) -> Vec<TrialLine> {
+        let evaluate = &self.config.evaluate;
+        let mut jobs = Vec::new();
+        for &order in &evaluate.orders {
+            for (method, _) in &self.methods {
+                jobs.extend((0..evaluate.trials).map(|index| (order, *method, index)));
+            }
+        }
+        let bar = progress_bar("evaluate", jobs.len() as u64);
+        let line = |&(order, method, index): &(GraspOrder, Method, u64)| {
+            let trial = self.trial(order, method, index, Recording::Off);
+            bar.inc(1);
+            trial.map(|trial| TrialLine::new(order, method, &trial))
+        };
+        // `filter_map` keeps the order of an indexed iterator's items.
+        let lines = jobs.par_iter().filter_map(line).collect();
+        bar.finish();
+        lines
+    }
+
+    /// The cells that these trials make.
+    pub fn results(&self, info: &RunInfo, lines: &[TrialLine]) -> Results {
+        let (object, robots) = (&self.config.object.name, &self.config.robots.names);
+        let mut cells = Vec::new();
+        for &order in &self.config.evaluate.orders {
+            for (method, _) in &self.methods {
+                let of_cell = lines.iter().filter(|line| line.order == order && line.method == *method);
+                cells.push(Cell::new(object, robots, order, *method, of_cell.map(|line| line.outcome)));
+            }
+        }
+        Results::new(info, cells)
+    }
+}
+
+impl TrialLine {
+    /// What is kept of a trial.
+    pub fn new(order: GraspOrder, method: Method, trial: &Trial) -> Self {
+        let record = &trial.record;
+        Self {
+            order,
+            method,
+            index: record.index,
+            outcome: record.outcome,
+            detail: record.detail.clone(),
+            steps: record.steps,
+            final_errors: record.final_errors,
+            threshold_factor: trial.threshold_factor.is_finite().then_some(trial.threshold_factor),
+        }
+    }
+}
+
+/// Writes `trials.jsonl` and `results.json`.
+pub fn save(directory: &Path, lines: &[TrialLine], results: &Results) -> Result<(), Failure> {
+    let path = directory.join("trials.jsonl");
+    write_whole(&path, |file| lines.iter().try_for_each(|line| writeln!(file, "{}", serde_json::to_string(line)?)))
+        .with_context(|| path.display().to_string())?;
+    let path = directory.join("results.json");
+    let json = serde_json::to_string_pretty(results)?;
+    Ok(write_whole(&path, |file| writeln!(file, "{json}")).with_context(|| path.display().to_string())?)
+}

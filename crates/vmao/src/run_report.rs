@@ -1,0 +1,198 @@
+//! The report of a run directory: reads what the run left, runs again the few trials that are shown.
+
+use crate::config::Config;
+use crate::dataset;
+use crate::evaluation::{Evaluation, TrialLine};
+use crate::exploration::failures;
+use crate::failure::{Failure, OrBadInput};
+use crate::json::Document;
+use crate::learning::{curves, json_lines, load};
+use crate::output::write_whole;
+use crate::provenance::RunInfo;
+use crate::report::{
+    Cell, ContactMapFigure, ExplorationRound, ExplorationSummary, LatentMap, Provenance, ReportData, RolloutFigure,
+    ThresholdPoint, TrainingCurve, TrainingEpoch, render,
+};
+use crate::results::{Method, Results};
+use anyhow::Context;
+use std::io::Write;
+use std::path::{Path, PathBuf};
+use vmao_core::catalogue::InstanceSet;
+use vmao_core::order::GraspOrder;
+use vmao_core::outcome::{FailureStage, TrialOutcome};
+use vmao_core::random::Stream;
+use vmao_sim::Recording;
+
+/// Names the stream of the latent codes that are shown.
+const SHOWN_LATENTS: u64 = 1 << 35;
+/// Latent codes shown for each scene, as in the supplement's Figure 4.
+const LATENTS_SHOWN: usize = 5;
+
+/// Writes `report.html` into a run directory and returns its path.
+pub fn write_report(directory: &Path) -> Result<PathBuf, Failure> {
+    let config = Config::load(Some(&directory.join("config.toml")), &[]).or_bad_input()?;
+    let info = RunInfo::load(directory).or_bad_input()?;
+    let results: Results = Document::read(&directory.join("results.json")).or_bad_input()?.parse().or_bad_input()?;
+    let lines: Vec<TrialLine> = json_lines(&directory.join("trials.jsonl"))?;
+    let models = directory.join("models");
+    let mut methods = Vec::new();
+    for method in [Method::Vmao, Method::Top1] {
+        if models.join(method.name()).is_dir() {
+            methods.push(load(&models.join(method.name()), config.robots.names.len())?);
+        }
+    }
+    let evaluation = Evaluation::new(&config, info.seed, methods)?;
+    let (exploration, digest) = explored(&config, &directory.join("data"))?;
+    let data = ReportData {
+        title: format!("vmao · {} with {}", config.object.name, config.robots.names.join(" + ")),
+        summary: summary(&results),
+        cells: cells(&results, &lines)?,
+        contact_maps: contact_maps(&evaluation, &lines, info.seed)?,
+        rollouts: rollouts(&evaluation, &lines),
+        training: training(&models)?,
+        exploration,
+        provenance: Provenance {
+            command: info.command.join(" "),
+            version: info.version,
+            commit: info.commit,
+            seed: info.seed,
+            digest,
+            config: config.to_toml()?,
+        },
+    };
+    let path = directory.join("report.html");
+    let page = render(&data);
+    write_whole(&path, |file| file.write_all(page.as_bytes())).with_context(|| path.display().to_string())?;
+    Ok(path)
+}
+
+fn summary(results: &Results) -> String {
+    let cell = |cell: &crate::results::Cell| {
+        format!("{} {}: {} of {}", cell.method().title(), cell.order().name(), cell.successes(), cell.trials())
+    };
+    format!("Trials that met the goal pose and joint angles. {}.", results.cells.iter().map(cell).collect::<Vec<_>>().join("; "))
+}
+
+/// The cells of the table, each with its success rate over scaled thresholds.
+fn cells(results: &Results, lines: &[TrialLine]) -> Result<Vec<Cell>, Failure> {
+    let shown = |cell: &crate::results::Cell| -> Result<Cell, Failure> {
+        let mut shown: Cell = serde_json::from_value(serde_json::to_value(cell)?)?;
+        let of_cell: Vec<&TrialLine> =
+            lines.iter().filter(|line| line.order == cell.order() && line.method == cell.method()).collect();
+        shown.threshold_curve = (1..=12)
+            .map(|step| {
+                let scale = f64::from(step) * 0.25;
+                let met = of_cell.iter().filter(|line| line.threshold_factor.is_some_and(|factor| factor <= scale)).count();
+                ThresholdPoint { scale, rate: met as f64 / of_cell.len().max(1) as f64 }
+            })
+            .collect();
+        Ok(shown)
+    };
+    results.cells.iter().map(shown).collect()
+}
+
+/// The second grasp's maps for five latent codes, on the first scenes that V-MAO solved in each order.
+fn contact_maps(evaluation: &Evaluation<'_>, lines: &[TrialLine], seed: u64) -> Result<Vec<ContactMapFigure>, Failure> {
+    let Some(model) = evaluation.model(Method::Vmao) else { return Ok(Vec::new()) };
+    let mut figures = Vec::new();
+    for (order, title, caption) in [
+        (
+            GraspOrder::Sequential,
+            "Lifted by the first gripper",
+            "The first gripper holds the object at its goal; the second looks.",
+        ),
+        (GraspOrder::Parallel, "Lying on the table", "Nothing is grasped yet."),
+    ] {
+        let is_shown = |line: &&TrialLine| line.order == order && line.method == Method::Vmao && line.outcome.is_success();
+        let Some(line) = lines.iter().find(is_shown) else { continue };
+        let trial = evaluation.trial(order, Method::Vmao, line.index, Recording::Off);
+        let Some((grasp, second)) = trial.as_ref().and_then(|trial| trial.record.grasps.iter().enumerate().nth(1)) else {
+            continue;
+        };
+        let seen = &second.observation;
+        let scene = model.networks[grasp].encode(&seen.points, &seen.colors)?;
+        let mut maps = Vec::new();
+        for shown in 0..LATENTS_SHOWN {
+            let latent = model.latent(grasp, &mut Stream::new(seed, &[SHOWN_LATENTS, shown as u64]));
+            let [finger1, finger2] = model.networks[grasp].decode(&scene, &latent)?.fingers;
+            maps.push(LatentMap { latent, finger1, finger2 });
+        }
+        figures.push(ContactMapFigure {
+            title: title.to_owned(),
+            caption: format!("Trial {}. {caption}", line.index),
+            points: seen.points.clone(),
+            colors: seen.colors.clone(),
+            labels: seen.labels.clone(),
+            maps,
+        });
+    }
+    Ok(figures)
+}
+
+/// A success of each order and the failure that got furthest.
+fn rollouts(evaluation: &Evaluation<'_>, lines: &[TrialLine]) -> Vec<RolloutFigure> {
+    let mut shown: Vec<&TrialLine> = Vec::new();
+    for order in [GraspOrder::Sequential, GraspOrder::SequentialParallel, GraspOrder::Parallel] {
+        shown.extend(lines.iter().find(|line| line.order == order && line.method == Method::Vmao && line.outcome.is_success()));
+    }
+    let failed = lines.iter().filter(|line| !line.outcome.is_success());
+    shown.extend(failed.max_by_key(|line| (line.method == Method::Vmao, line.steps, std::cmp::Reverse(line.index))));
+    let figure = |line: &TrialLine| {
+        let rollout = evaluation.trial(line.order, line.method, line.index, Recording::On)?.rollout?;
+        let what = match line.outcome {
+            TrialOutcome::Success => "Success".to_owned(),
+            TrialOutcome::Failed(stage) => format!("Failure: {}", stage.name()),
+        };
+        let title = format!("{what} · {} · {}", line.order.name(), line.method.title());
+        let caption = format!("Trial {}.{}{}", line.index, if line.detail.is_empty() { "" } else { " " }, line.detail);
+        Some(RolloutFigure { title, caption, rollout })
+    };
+    shown.into_iter().filter_map(figure).collect()
+}
+
+fn training(models: &Path) -> Result<Vec<TrainingCurve>, Failure> {
+    let mut all = Vec::new();
+    for method in [Method::Vmao, Method::Top1] {
+        let lines = curves(&models.join(method.name()))?;
+        let grasps = lines.iter().map(|line| line.grasp + 1).max().unwrap_or(0);
+        for grasp in 0..grasps {
+            let epoch = |line: &crate::learning::EpochLine| TrainingEpoch {
+                train_reconstruction: f64::from(line.train_reconstruction),
+                validation_reconstruction: line.validation_reconstruction.map_or(f64::NAN, f64::from),
+                kl: if method == Method::Vmao { f64::from(line.train_kl) } else { f64::NAN },
+                beta: if method == Method::Vmao { f64::from(line.beta) } else { f64::NAN },
+            };
+            let epochs = lines.iter().filter(|line| line.grasp == grasp).map(epoch).collect();
+            all.push(TrainingCurve { model: format!("{}, grasp {}", method.title(), grasp + 1), epochs });
+        }
+    }
+    Ok(all)
+}
+
+/// How the label set of the run grew, and the digest of its records; empty without a data set.
+fn explored(config: &Config, directory: &Path) -> Result<(Option<ExplorationSummary>, String), Failure> {
+    if !directory.is_dir() {
+        return Ok((None, String::new()));
+    }
+    let mut rounds = Vec::new();
+    let mut records = Vec::new();
+    for shard in dataset::shards(directory).or_bad_input()? {
+        let round = dataset::read_shard(&shard).or_bad_input()?;
+        let successes = round.iter().filter(|record| record.outcome.is_success()).count() as u64;
+        rounds.push(ExplorationRound { trials: round.len() as u64, successes });
+        records.extend(round);
+    }
+    let demonstrations =
+        crate::scenes::items(config, InstanceSet::Train)?.iter().map(|item| item.demonstrations.len() as u64).max();
+    let summary = ExplorationSummary {
+        trials: records.len() as u64,
+        successes: rounds.iter().map(|round| round.successes).sum(),
+        demonstrations: demonstrations.unwrap_or(0),
+        failures: failures(&records)
+            .into_iter()
+            .filter(|(_, count)| *count > 0)
+            .collect::<std::collections::BTreeMap<FailureStage, u64>>(),
+        rounds,
+    };
+    Ok((Some(summary), dataset::digest(&records)))
+}

@@ -1,0 +1,33 @@
+//! From a configuration to compiled scenes: one for each size of the object.
+
+use crate::config::Config;
+use crate::failure::Failure;
+use crate::wording::unknown;
+use vmao_core::catalogue::{self, CatalogueItem, INSTANCES, InstanceSet};
+use vmao_core::robots::RobotModel;
+use vmao_sim::Scene;
+
+/// The configured object in every size of `set`. An unknown name is bad input.
+pub fn items(config: &Config, set: InstanceSet) -> Result<Vec<CatalogueItem>, Failure> {
+    let name = &config.object.name;
+    let item = |instance| catalogue::item(name, set, instance);
+    let unknown = || Failure::bad_input(unknown("the catalogue", "object", name, catalogue::NAMES));
+    (0..INSTANCES).map(|instance| item(instance).ok_or_else(unknown)).collect()
+}
+
+/// Compiles the configured scene for every size in `set`. Unknown names and too few or many arms are bad input.
+pub fn scenes(config: &Config, set: InstanceSet) -> Result<Vec<Scene>, Failure> {
+    let robot = |name: &String| {
+        RobotModel::named(name).ok_or_else(|| Failure::bad_input(unknown("the program", "robot", name, RobotModel::NAMES)))
+    };
+    let robots = config.robots.names.iter().map(robot).collect::<Result<Vec<_>, _>>()?;
+    let compile = |item: CatalogueItem| {
+        let (arms, parts) = (robots.len(), item.object.parts.len());
+        if arms != parts {
+            let message = format!("robots.names: {arms} arms, expected {parts}: one for each part of `{}`", item.object.name);
+            return Err(Failure::bad_input(message));
+        }
+        Ok(Scene::new(&config.scene, robots.clone(), item)?)
+    };
+    items(config, set)?.into_iter().map(compile).collect()
+}
