@@ -77,7 +77,7 @@ fn gradients_of_the_whole_objective_match_finite_differences() {
                 continue;
             }
             let start = trainer.parameters.values[i].clone();
-            check(&spec.name, &start, gradient, 2e-3, 0.05, |values| {
+            check(&spec.name, &start, gradient, 5e-4, 0.05, |values| {
                 trainer.parameters.values[i] = values.to_vec();
                 let (terms, ..) = trainer.gradients(&batch, noise.clone(), config.beta);
                 trainer.parameters.values[i] = start.clone();
