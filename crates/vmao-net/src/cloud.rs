@@ -36,21 +36,37 @@ pub(crate) fn check_cloud(points: &[[f32; 3]], colors: &[[f32; 3]], fewest: usiz
     Ok(())
 }
 
-/// The cloud in the network's frame: xy from the mean of what stands on the table, z from the height origin (m).
+/// The cloud in the network's frame: xy from the geometric median of what stands on the table, z from the height origin (m).
 ///
-/// A cloud with nothing above the table is centred on its own mean. The frame moves with the cloud in x and y and keeps heights.
+/// The median stays with the many points of the object where a mean would follow the few of an arm. A cloud with nothing above the
+/// table is centred on its own median. The frame moves and turns with the cloud along the table and keeps heights.
 pub(crate) fn centre(points: &[[f32; 3]], config: &NetworkConfig) -> Vec<[f32; 3]> {
-    let mean = |keep: &dyn Fn(&[f32; 3]) -> bool| {
-        let mut sums = [0.0_f64; 3];
-        for p in points.iter().filter(|p| keep(p)) {
-            sums[0] += f64::from(p[0]);
-            sums[1] += f64::from(p[1]);
-            sums[2] += 1.0;
-        }
-        (sums[2] > 0.0).then(|| [(sums[0] / sums[2]) as f32, (sums[1] / sums[2]) as f32])
-    };
-    let [x, y] = mean(&|p| p[2] > config.table_height).or_else(|| mean(&|_| true)).unwrap_or([0.0; 2]);
+    let mut standing: Vec<[f64; 2]> =
+        points.iter().filter(|p| p[2] > config.table_height).map(|p| [f64::from(p[0]), f64::from(p[1])]).collect();
+    if standing.is_empty() {
+        standing = points.iter().map(|p| [f64::from(p[0]), f64::from(p[1])]).collect();
+    }
+    let [x, y] = geometric_median(&standing).map(|x| x as f32);
     points.iter().map(|p| [p[0] - x, p[1] - y, p[2] - config.height_origin]).collect()
+}
+
+/// The point with the least sum of distances to `points`: Weiszfeld's iteration from the mean, a fixed number of steps.
+fn geometric_median(points: &[[f64; 2]]) -> [f64; 2] {
+    const STEPS: usize = 30;
+    /// Distances below this count as this much, so that a point hit exactly does not divide by zero (m).
+    const NEAREST: f64 = 1e-3;
+    let mut median = [0.0; 2];
+    for step in 0..=STEPS {
+        let mut sums = [0.0; 3];
+        for p in points {
+            let weight = if step == 0 { 1.0 } else { 1.0 / (p[0] - median[0]).hypot(p[1] - median[1]).max(NEAREST) };
+            sums[0] += weight * p[0];
+            sums[1] += weight * p[1];
+            sums[2] += weight;
+        }
+        median = [sums[0] / sums[2], sums[1] / sums[2]];
+    }
+    median
 }
 
 /// Rows [x, y, z, r, g, b] of a centred cloud, positions in `position_unit`, colours about zero.
@@ -117,11 +133,20 @@ mod tests {
     #[test]
     fn the_frame_follows_the_object_and_keeps_heights() {
         let config = NetworkConfig::small();
-        let scene = [[1.0, 2.0, 0.02], [1.2, 2.0, 0.04], [5.0, -3.0, 0.0]];
+        let scene = [[1.0, 2.0, 0.02], [1.2, 2.0, 0.04], [1.0, 2.2, 0.04], [1.2, 2.2, 0.04], [5.0, -3.0, 0.0]];
         let centred = centre(&scene, &config);
-        assert!((centred[0][0] + 0.1).abs() < 1e-6 && (centred[1][0] - 0.1).abs() < 1e-6 && centred[0][1].abs() < 1e-6);
+        assert!((centred[0][0] + 0.1).abs() < 1e-6 && (centred[3][1] - 0.1).abs() < 1e-6);
         assert!((centred[1][2] - (0.04 - config.height_origin)).abs() < 1e-7);
         let flat = centre(&[[1.0, 0.0, 0.0], [3.0, 0.0, 0.001]], &config);
         assert_eq!([flat[0][0], flat[1][0]], [-1.0, 1.0]);
+    }
+
+    #[test]
+    fn a_few_points_of_an_arm_hardly_move_the_frame() {
+        let mut points: Vec<[f64; 2]> = (0..80).map(|i| [f64::from(i % 9) * 0.01, f64::from(i % 5) * 0.01]).collect();
+        let alone = geometric_median(&points);
+        points.extend([[0.3, 0.4]; 16]);
+        let beside = geometric_median(&points);
+        assert!((beside[0] - alone[0]).hypot(beside[1] - alone[1]) < 0.01, "{alone:?} {beside:?}: a mean moves by 0.08");
     }
 }

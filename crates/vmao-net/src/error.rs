@@ -49,7 +49,7 @@ pub enum Error {
         step: usize,
         /// Epoch, from one.
         epoch: usize,
-        /// Batch of the epoch, from one.
+        /// Batch of the epoch, from one; zero for the validation after it.
         batch: usize,
     },
     /// The bytes are not a safetensors file.

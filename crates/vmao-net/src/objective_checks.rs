@@ -4,7 +4,7 @@ use crate::batch::{Batch, Prepared};
 use crate::cloud::Example;
 use crate::config::{AbstractionConfig, LatentPlacement, ModelKind, NetworkConfig, TrainingConfig, UpConvConfig};
 use crate::kernels::cross_entropy::cross_entropy;
-use crate::kernels::finite_difference::{check, normal};
+use crate::kernels::finite_difference::{check, dot, normal};
 use crate::network::ContactNetwork;
 use crate::training::Trainer;
 use vmao_core::random::Stream;
@@ -77,7 +77,10 @@ fn gradients_of_the_whole_objective_match_finite_differences() {
                 continue;
             }
             let start = trainer.parameters.values[i].clone();
-            check(&spec.name, &start, gradient, 2e-3, 0.05, |values| {
+            // Steps that change the loss by 1e-3 down to 1e-5, some tens of roundings of it.
+            let length = dot(gradient, gradient).sqrt();
+            let steps = [1e-3, 2e-4, 4e-5, 1e-5].map(|change| change / length.max(1e-3));
+            check(&spec.name, &start, gradient, &steps, 0.05, |values| {
                 trainer.parameters.values[i] = values.to_vec();
                 let (terms, ..) = trainer.gradients(&batch, noise.clone(), config.beta);
                 trainer.parameters.values[i] = start.clone();

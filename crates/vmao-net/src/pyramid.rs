@@ -4,7 +4,7 @@
 //! come first in it, which are spread out and do not depend on how the cloud was listed.
 
 use crate::config::NetworkConfig;
-use crate::neighbours::{ball_query, farthest_point_order, nearest};
+use crate::neighbours::{ball_query, farthest_point_order, nearest, squared_distance};
 
 /// The neighbourhoods of one cloud. Rigid motions leave them as they are.
 #[derive(Debug, Clone)]
@@ -33,7 +33,7 @@ pub(crate) enum Flow {
 impl Pyramid {
     /// Orders `points` (at least `config.fewest_points()`) and finds all neighbours.
     pub(crate) fn new(points: &[[f32; 3]], config: &NetworkConfig) -> Self {
-        let order = farthest_point_order(points, points.len());
+        let order = farthest_point_order(points, &weights(points, config.density_power), points.len());
         let ordered: Vec<[f32; 3]> = order.iter().map(|&i| points[i as usize]).collect();
         let mut counts = vec![points.len()];
         let (mut balls, mut near) = (Vec::new(), Vec::new());
@@ -76,6 +76,29 @@ impl Pyramid {
     }
 }
 
+/// Weights of the farthest-point order: one over the local spacing of the points, to a power.
+///
+/// With power 0 centroids cover space evenly; with 1 they are as dense as the points are, so that a bare table and the arms, which
+/// the cameras sample thinly, do not take the centroids away from the object.
+fn weights(points: &[[f32; 3]], power: f32) -> Vec<f32> {
+    if power == 0.0 {
+        return vec![1.0; points.len()];
+    }
+    let k = SPACING_NEIGHBOURS.min(points.len());
+    let near = nearest(points, points, k);
+    // The mean, not the last: a centroid that is a point's last neighbour would lie at exactly one spacing from it, and so tie.
+    let spacing = |(point, near): (&[f32; 3], &[u32])| {
+        near.iter().map(|&other| squared_distance(*point, points[other as usize]).sqrt()).sum::<f32>() / k as f32
+    };
+    points.iter().zip(near.chunks_exact(k)).map(spacing).map(|s| s.max(SMALLEST_SPACING).powf(-power)).collect()
+}
+
+/// How many nearest points, itself included, measure the spacing around a point by their mean distance.
+const SPACING_NEIGHBOURS: usize = 9;
+
+/// Spacing below which points count as equally dense (m).
+const SMALLEST_SPACING: f32 = 5e-4;
+
 /// A level that takes in everything has a radius without meaning; its offsets are in units of a table-top object (m).
 const LARGEST_UNIT: f32 = 0.15;
 
@@ -107,5 +130,28 @@ mod tests {
                 assert!(flow == Flow::Up || length <= 1.0 + 1e-5, "a ball holds what is within the radius");
             }
         }
+    }
+
+    #[test]
+    fn the_order_does_not_depend_on_how_the_points_are_listed() {
+        let mut s = Stream::new(3, &[]);
+        let points: Vec<[f32; 3]> = (0..700).map(|_| std::array::from_fn(|_| s.range(0.0, 0.1) as f32)).collect();
+        let shuffle = s.permutation(points.len());
+        let listed: Vec<[f32; 3]> = shuffle.iter().map(|&i| points[i]).collect();
+        let back: Vec<u32> =
+            Pyramid::new(&listed, &NetworkConfig::small()).order.iter().map(|&i| shuffle[i as usize] as u32).collect();
+        assert_eq!(back, Pyramid::new(&points, &NetworkConfig::small()).order);
+    }
+
+    #[test]
+    fn a_thin_table_does_not_take_the_centroids_away_from_the_object() {
+        let mut s = Stream::new(3, &[]);
+        let mut points: Vec<[f32; 3]> = (0..150).map(|_| [s.range(-0.3, 0.3) as f32, s.range(-0.3, 0.3) as f32, 0.0]).collect();
+        points.extend((0..350).map(|_| [s.range(-0.05, 0.05) as f32, s.range(-0.01, 0.01) as f32, s.range(0.0, 0.02) as f32]));
+        let on_object = |density_power: f32| {
+            let pyramid = Pyramid::new(&points, &NetworkConfig { density_power, ..NetworkConfig::small() });
+            pyramid.order[..100].iter().filter(|&&i| i >= 150).count()
+        };
+        assert!(on_object(0.0) < 20 && (55..85).contains(&on_object(1.0)), "{} {}", on_object(0.0), on_object(1.0));
     }
 }

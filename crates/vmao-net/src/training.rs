@@ -87,6 +87,15 @@ pub fn train(
         let validated = trainer.validate(&prepared, validation);
         let report = EpochReport { epoch, epochs: training.epochs, training: mean, validation: validated, beta, learning_rate };
         let loss = validated.map_or(f32::NEG_INFINITY, |elbo| elbo.reconstruction + network.beta * elbo.kl);
+        if loss.is_nan() || loss == f32::INFINITY {
+            return Err(Error::Diverged {
+                what: "validation loss".to_owned(),
+                value: loss,
+                step: trainer.steps,
+                epoch,
+                batch: 0,
+            });
+        }
         if best.as_ref().is_none_or(|(least, _)| loss < *least || validated.is_none()) {
             best = Some((loss, trainer.checkpoint(epoch, validated)));
         }

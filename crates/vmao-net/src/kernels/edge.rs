@@ -131,10 +131,10 @@ mod tests {
             let (gain, bias, weight) = (normal(3, CHANNELS), normal(4, CHANNELS), normal(5, ROWS / pool * CHANNELS));
             let (_, tape) = norm_relu(&f, &w, &gain, &bias, &edges, pool);
             let [df, dw, dg, db] = norm_relu_backward(&f, &w, &edges, &tape, &weight);
-            check("features", &f, &df, 1e-3, 0.02, |f| dot(&norm_relu(f, &w, &gain, &bias, &edges, pool).0, &weight));
-            check("W", &w, &dw, 1e-3, 0.02, |w| dot(&norm_relu(&f, w, &gain, &bias, &edges, pool).0, &weight));
-            check("gain", &gain, &dg, 1e-3, 0.02, |gain| dot(&norm_relu(&f, &w, gain, &bias, &edges, pool).0, &weight));
-            check("bias", &bias, &db, 5e-4, 0.02, |bias| dot(&norm_relu(&f, &w, &gain, bias, &edges, pool).0, &weight));
+            check("features", &f, &df, &[1e-3], 0.02, |f| dot(&norm_relu(f, &w, &gain, &bias, &edges, pool).0, &weight));
+            check("W", &w, &dw, &[1e-3], 0.02, |w| dot(&norm_relu(&f, w, &gain, &bias, &edges, pool).0, &weight));
+            check("gain", &gain, &dg, &[1e-3], 0.02, |gain| dot(&norm_relu(&f, &w, gain, &bias, &edges, pool).0, &weight));
+            check("bias", &bias, &db, &[5e-4], 0.02, |bias| dot(&norm_relu(&f, &w, &gain, bias, &edges, pool).0, &weight));
         }
     }
 }

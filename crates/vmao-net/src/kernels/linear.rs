@@ -124,10 +124,10 @@ mod tests {
             let (gain, bias, weight) = (normal(3, CHANNELS), normal(4, CHANNELS), normal(5, rows / pool * CHANNELS));
             let (_, tape) = norm_relu(&x, &w, &gain, &bias, pool);
             let [dx, dw, dg, db] = norm_relu_backward(&x, &w, &tape, &weight);
-            check("x", &x, &dx, 2e-3, 0.02, |x| dot(&norm_relu(x, &w, &gain, &bias, pool).0, &weight));
-            check("W", &w, &dw, 1e-3, 0.02, |w| dot(&norm_relu(&x, w, &gain, &bias, pool).0, &weight));
-            check("gain", &gain, &dg, 1e-3, 0.02, |gain| dot(&norm_relu(&x, &w, gain, &bias, pool).0, &weight));
-            check("bias", &bias, &db, 5e-4, 0.02, |bias| dot(&norm_relu(&x, &w, &gain, bias, pool).0, &weight));
+            check("x", &x, &dx, &[2e-3], 0.02, |x| dot(&norm_relu(x, &w, &gain, &bias, pool).0, &weight));
+            check("W", &w, &dw, &[1e-3], 0.02, |w| dot(&norm_relu(&x, w, &gain, &bias, pool).0, &weight));
+            check("gain", &gain, &dg, &[1e-3], 0.02, |gain| dot(&norm_relu(&x, &w, gain, &bias, pool).0, &weight));
+            check("bias", &bias, &db, &[5e-4], 0.02, |bias| dot(&norm_relu(&x, &w, &gain, bias, pool).0, &weight));
         }
     }
 
@@ -136,8 +136,8 @@ mod tests {
         let (x, w, b) = (normal(1, ROWS * INPUTS), normal(2, INPUTS * CHANNELS), normal(3, CHANNELS));
         let weight = normal(5, ROWS * CHANNELS);
         let [dx, dw, db] = linear_backward(&x, &w, &weight, CHANNELS);
-        check("x", &x, &dx, 1e-1, 1e-3, |x| dot(&linear(x, &w, &b, CHANNELS), &weight));
-        check("W", &w, &dw, 1e-1, 1e-3, |w| dot(&linear(&x, w, &b, CHANNELS), &weight));
-        check("b", &b, &db, 1e-1, 1e-3, |b| dot(&linear(&x, &w, b, CHANNELS), &weight));
+        check("x", &x, &dx, &[1e-1], 1e-3, |x| dot(&linear(x, &w, &b, CHANNELS), &weight));
+        check("W", &w, &dw, &[1e-1], 1e-3, |w| dot(&linear(&x, w, &b, CHANNELS), &weight));
+        check("b", &b, &db, &[1e-1], 1e-3, |b| dot(&linear(&x, &w, b, CHANNELS), &weight));
     }
 }

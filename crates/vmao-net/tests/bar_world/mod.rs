@@ -1,4 +1,4 @@
-//! A toy with two right answers: a bar under a crossing bar on a table, gripped across at one of two places.
+//! A toy with two right answers: a bar under a crossing bar on a table beside an arm, gripped across at one of two places.
 //!
 //! The bar is 100 × 16 × 20 mm; grips cluster 30 mm either side of its middle; finger 1 is on its left side, finger 2 on its right.
 //! The crossing bar, of another colour, sticks out to the left, which tells the sides apart.
@@ -24,13 +24,13 @@ pub(crate) struct Scene {
     pub(crate) mode: f64,
 }
 
-/// Points of each solid and of the table.
-const COUNTS: [usize; 3] = [440, 260, 260];
+/// Points of the bar, the crossing bar, the table and an arm: the shares of the simulator's cameras.
+const COUNTS: [usize; 4] = [440, 270, 155, 155];
 
 pub(crate) fn scene(seed: u64, index: u64) -> Scene {
     let mut s = Stream::new(seed, &[index]);
     let yaw = s.range(-std::f64::consts::PI, std::f64::consts::PI);
-    let position = [s.range(-0.1, 0.1), s.range(-0.1, 0.1)];
+    let position = [s.range(-0.07, 0.07), s.range(-0.07, 0.07)];
     let tilt = std::f64::consts::FRAC_PI_2 + s.range(-0.3, 0.3);
     let (mut points, mut colors) = (Vec::new(), Vec::new());
     let world = |p: [f64; 3]| {
@@ -49,8 +49,15 @@ pub(crate) fn scene(seed: u64, index: u64) -> Scene {
         colors.push([0.15, 0.25, 0.8]);
     }
     for _ in 0..COUNTS[2] {
-        points.push([(position[0] + s.range(-0.12, 0.12)) as f32, (position[1] + s.range(-0.12, 0.12)) as f32, 0.0]);
+        points.push([s.range(-0.25, 0.25) as f32, s.range(-0.25, 0.25) as f32, 0.0]);
         colors.push([0.6, 0.55, 0.5]);
+    }
+    let (azimuth, distance, height) = (s.range(0.0, std::f64::consts::TAU), s.range(0.12, 0.2), s.range(0.05, 0.2));
+    for _ in 0..COUNTS[3] {
+        let p = on_box([0.03, 0.03, 0.15], &mut s);
+        let (x, y) = (position[0] + distance * azimuth.cos() + p[0], position[1] + distance * azimuth.sin() + p[1]);
+        points.push([x, y, height + p[2]].map(|x| x as f32));
+        colors.push([0.9, 0.9, 0.9]);
     }
     let mode = if s.unit() < 0.5 { -1.0 } else { 1.0 };
     let along = mode * MODE + s.range(-SPREAD, SPREAD);
