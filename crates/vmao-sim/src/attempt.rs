@@ -1,12 +1,14 @@
 //! The steps of one trial. Each method is one line of the algorithm; [`crate::trial`] strings them together.
 
+use crate::assignment::assignments;
 use crate::cameras::observe;
+use crate::combinations::{Choices, Reserve, compatible_grasps, free_alone, joint_positions_with};
 use crate::failure::Failure;
-use crate::grasping::{Grasp, MAX_JOINT_STEP, compatible_grasps, ik_settings, joint_positions_with, reachable_grasps};
+use crate::grasping::{Grasp, MAX_JOINT_STEP, ik_settings, object_cloud, reachable_grasps};
 use crate::planning_world::{Obstacles, collision_world};
 use crate::recorder::Recorder;
 use crate::scene::Scene;
-use crate::simulation::{Grip, Simulation, hold_centers};
+use crate::simulation::{Grip, Simulation};
 use crate::task::{goal_errors, sample_goal, sample_start, threshold_factor};
 use crate::trial::{Recording, Trial, TrialConfig};
 use nalgebra::Point3;
@@ -99,7 +101,7 @@ impl<'a> Attempt<'a> {
             simulation.recorder = Some(Recorder::new(scene, goal_parts.clone()));
         }
         let errors = goal_errors(scene, &goal_parts, &goal, &start);
-        let arms = nearest_arms(scene, &start);
+        let arms = assignments(scene, &[], &[&start.world_from_parts, &goal_parts]).remove(0);
         let (held, grasps) = (Vec::new(), Vec::new());
         Self {
             scene,
@@ -183,26 +185,67 @@ impl<'a> Attempt<'a> {
     }
 
     /// Gripper poses for these contacts that all arms reach, carry to the step's goal, and take without meeting; best first.
+    ///
+    /// Arms are assigned to parts by distance; the other way round only if that leaves no way, now or for later grasps.
     pub(crate) fn choose_grasps(&mut self, contacts: &[[Point3<f64>; 2]]) -> Result<Vec<Vec<Grasp>>, Failure> {
-        let first = self.held.len();
-        let goal = self.step_goal(first + contacts.len());
-        let poses = self.waypoints(&self.trajectory(goal));
         let mut stream = self.stream(Draw::Reach);
-        let mut candidates = Vec::new();
-        let observation = self.grasps[first].observation.clone();
-        for (grasp, fingers) in contacts.iter().enumerate() {
-            let (arm, part) = (self.arms[first + grasp], PartId((first + grasp) as u16));
-            let motion: Vec<Pose> = poses.iter().map(|parts| parts[usize::from(part.0)]).collect();
-            candidates.push(reachable_grasps(
-                &self.simulation,
-                &self.config.grasp,
-                (arm, part),
-                (&observation, fingers),
-                &motion,
-                &mut stream,
-            )?);
+        let now = self.simulation.object_state().world_from_parts;
+        let mut crowded = Err(Failure::new(FailureStage::NoPlan, "no arm is free"));
+        for (rank, arms) in assignments(self.scene, &self.held, &[&now, &self.goal_parts]).into_iter().enumerate() {
+            match self.choices(&arms, contacts, &mut stream) {
+                Ok(Choices { roomy, .. }) if !roomy.is_empty() => return Ok(self.assign(&arms, roomy)),
+                Ok(choices) if crowded.is_err() => crowded = Ok((arms, choices.crowded)),
+                Err(failure) if rank == 0 => crowded = Err(failure),
+                _ => {}
+            }
         }
-        compatible_grasps(&self.simulation, &self.config.grasp, &candidates, &self.holders())
+        crowded.map(|(arms, grasps)| self.assign(&arms, grasps))
+    }
+
+    /// The combinations of grasps on these contacts that the arms can make if part p is taken by `arms[p]`.
+    fn choices(&self, arms: &[ArmId], contacts: &[[Point3<f64>; 2]], stream: &mut Stream) -> Result<Choices, Failure> {
+        let (first, config) = (self.held.len(), &self.config.grasp);
+        let cloud = object_cloud(&self.grasps[first].observation);
+        let holders = self.holders();
+        let motion = self.waypoints(&self.trajectory(self.step_goal(first + contacts.len())));
+        let mut candidates = Vec::new();
+        for (grasp, fingers) in contacts.iter().enumerate() {
+            let (arm, part) = (arms[first + grasp], PartId((first + grasp) as u16));
+            let reached = reachable_grasps(&self.simulation, config, (arm, part), (&cloud, fingers), &motion, stream)?;
+            candidates.push(free_alone(&self.simulation, config, &holders, &motion[0], reached));
+        }
+        let reserve = self.reserve(arms, first + contacts.len(), &motion, stream);
+        compatible_grasps(&self.simulation, config, &candidates, &holders, &reserve)
+    }
+
+    /// How the parts from `next` on could be taken where the object is after `motion`: as demonstrated, on average.
+    fn reserve(&self, arms: &[ArmId], next: usize, motion: &[Vec<Pose>], stream: &mut Stream) -> Reserve {
+        let world_from_parts = motion[motion.len() - 1].clone();
+        let motion = [world_from_parts.clone(), self.goal_parts.clone()];
+        let mut grasps = Vec::new();
+        for part in next..self.part_count() {
+            let fingers = self.scene.hold_fingers[part].map(|point| world_from_parts[part] * point);
+            let (arm, place) = (arms[part], PartId(part as u16));
+            let reached = reachable_grasps(&self.simulation, &self.config.grasp, (arm, place), (&[], &fingers), &motion, stream);
+            let reached = reached.unwrap_or_default();
+            grasps.push(free_alone(&self.simulation, &self.config.grasp, &self.holders(), &world_from_parts, reached));
+        }
+        Reserve { world_from_parts, grasps }
+    }
+
+    /// Decides who takes which part, and notes it where the contacts were noted.
+    fn assign(&mut self, arms: &[ArmId], choices: Vec<Vec<Grasp>>) -> Vec<Vec<Grasp>> {
+        let first = self.held.len();
+        self.arms = arms.to_vec();
+        for (record, arm) in self.grasps.iter_mut().zip(arms).skip(first) {
+            record.arm = *arm;
+        }
+        if let Some(recorder) = &mut self.simulation.recorder {
+            for (contact, arm) in recorder.rollout.contacts.iter_mut().zip(arms).skip(first) {
+                contact.1 = arm.0;
+            }
+        }
+        choices
     }
 
     /// The first of these grasps that a collision-free motion of all its arms together leads to.
@@ -420,36 +463,4 @@ impl<'a> Attempt<'a> {
         let got_so_far = matches!(outcome, TrialOutcome::Success | TrialOutcome::Failed(FailureStage::Threshold));
         Trial { record, threshold_factor: if got_so_far { self.factor } else { f64::INFINITY }, rollout }
     }
-}
-
-/// The assignment of arms to parts that keeps the arms' bases nearest to their parts; arm i to part i among equals.
-fn nearest_arms(scene: &Scene, start: &ObjectState) -> Vec<ArmId> {
-    let count = scene.object.parts.len();
-    let centers = hold_centers(scene, start);
-    let distance = |arm: usize, part: usize| (centers[part].coords - scene.world_from_bases[arm].translation.vector).xy().norm();
-    let mut best = ((0..count).collect::<Vec<_>>(), f64::INFINITY);
-    permutations(count, &mut |order| {
-        let total: f64 = order.iter().enumerate().map(|(part, &arm)| distance(arm, part)).sum();
-        if total < best.1 - 1e-9 {
-            best = (order.to_vec(), total);
-        }
-    });
-    best.0.into_iter().map(|arm| ArmId(arm as u16)).collect()
-}
-
-/// Calls `visit` with every order of `0..count`, in lexicographic order.
-fn permutations(count: usize, visit: &mut dyn FnMut(&[usize])) {
-    fn extend(chosen: &mut Vec<usize>, count: usize, visit: &mut dyn FnMut(&[usize])) {
-        if chosen.len() == count {
-            visit(chosen);
-        }
-        for next in 0..count {
-            if !chosen.contains(&next) {
-                chosen.push(next);
-                extend(chosen, count, visit);
-                chosen.pop();
-            }
-        }
-    }
-    extend(&mut Vec::with_capacity(count), count, visit);
 }

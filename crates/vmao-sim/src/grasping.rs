@@ -2,11 +2,10 @@
 
 use crate::cameras::TABLE_PLANE_HEIGHT;
 use crate::failure::Failure;
-use crate::planning_world::{Obstacles, collision_world, lowest_gripper_point};
+use crate::planning_world::lowest_gripper_point;
 use crate::simulation::Simulation;
 use nalgebra::{Point3, Vector3};
 use serde::{Deserialize, Serialize};
-use vmao_core::collision::CollisionChecker;
 use vmao_core::contact::{ArmId, PartId};
 use vmao_core::geometry::{Pose, interpolate};
 use vmao_core::gripper_pose::{GripperPose, gripper_poses, squared};
@@ -67,7 +66,7 @@ pub(crate) struct Grasp {
     pub(crate) approach: Vec<Vec<f64>>,
     /// Joint positions along the motion that follows.
     pub(crate) carried: Vec<Vec<f64>>,
-    cost: f64,
+    pub(crate) cost: f64,
 }
 
 impl Grasp {
@@ -83,24 +82,24 @@ impl Grasp {
 /// Waypoints of the straight approach, and the largest joint step between neighbouring waypoints of a motion (rad).
 const APPROACH_WAYPOINTS: usize = 6;
 /// Branches of joint solutions kept of each gripper pose.
-const BRANCHES: usize = 3;
-/// Free combinations of grasps that are handed to the planner.
-const PLANNED_COMBINATIONS: usize = 3;
+const BRANCHES: usize = 5;
+/// The elbow is looked for swung to both sides by this much, besides where it is (rad).
+const ELBOW_SWING: f64 = 0.9;
 pub(crate) const MAX_JOINT_STEP: f64 = 0.6;
 
 pub(crate) fn ik_settings(restarts: usize) -> IkSettings {
     IkSettings { position_tolerance: 1e-4, rotation_tolerance: 1e-3, max_iterations: 60, restarts }
 }
 
-/// Gripper poses on these world points that the arm reaches and can carry along `part_motion`, best first.
+/// Gripper poses on these world points that the arm reaches and can carry along `motion`, best first.
 ///
-/// `part_motion` are the part's poses along the planned motion, the present one first.
+/// `motion` are the poses of all parts along the planned motion, those at the grasp first; `cloud` shows the object.
 pub(crate) fn reachable_grasps(
     simulation: &Simulation<'_>,
     config: &GraspConfig,
     (arm, part): (ArmId, PartId),
-    (observation, fingers): (&Observation, &[Point3<f64>; 2]),
-    part_motion: &[Pose],
+    (cloud, fingers): (&[Point3<f64>], &[Point3<f64>; 2]),
+    motion: &[Vec<Pose>],
     stream: &mut Stream,
 ) -> Result<Vec<Grasp>, Failure> {
     let index = usize::from(arm.0);
@@ -114,8 +113,7 @@ pub(crate) fn reachable_grasps(
         ));
     }
     let opening = (width + config.opening_margin).min(robot.gripper.max_opening());
-    let cloud = object_cloud(observation);
-    let squared = squared(fingers, &cloud, config.squaring_deg.to_radians());
+    let squared = squared(fingers, cloud, config.squaring_deg.to_radians());
     let poses = gripper_poses(squared.as_ref().unwrap_or(fingers), config.approaches);
     if poses.is_empty() {
         return Err(Failure::new(FailureStage::Unreachable, "both fingers on one point"));
@@ -139,7 +137,7 @@ pub(crate) fn reachable_grasps(
             (arm, part),
             &GripperPose { world_from_tool, ..pose },
             opening,
-            part_motion,
+            motion,
             stream,
         ));
     }
@@ -152,7 +150,7 @@ pub(crate) fn reachable_grasps(
 }
 
 /// Points that lie neither on an arm, which knows where it is, nor on the table's plane.
-fn object_cloud(observation: &Observation) -> Vec<Point3<f64>> {
+pub(crate) fn object_cloud(observation: &Observation) -> Vec<Point3<f64>> {
     let seen = observation.points.iter().zip(&observation.labels);
     seen.filter(|(_, label)| !matches!(label, PointLabel::Arm(_)))
         .map(|(point, _)| Point3::from(point.map(f64::from)))
@@ -167,7 +165,7 @@ fn carried_grasps(
     (arm, part): (ArmId, PartId),
     pose: &GripperPose,
     opening: f64,
-    part_motion: &[Pose],
+    motion: &[Vec<Pose>],
     stream: &mut Stream,
 ) -> Vec<Grasp> {
     let index = usize::from(arm.0);
@@ -177,13 +175,20 @@ fn carried_grasps(
     let now = simulation.joint_positions(index);
     let standoff = base_from_world * pose.backed_off(config.standoff);
     let grasp = base_from_world * pose.world_from_tool;
-    let starts = solutions(chain, &standoff, now.as_slice(), config.ik_candidates, &settings, stream);
+    let mut starts = solutions(chain, &standoff, now.as_slice(), config.ik_candidates, &settings, stream);
+    for swing in [ELBOW_SWING, -ELBOW_SWING] {
+        // Turned about the vertical at the base and back at the upper arm: the hand stays, the elbow goes aside.
+        let mut seed = now.as_slice().to_vec();
+        seed[0] += swing;
+        seed[2] -= swing;
+        starts.extend(solutions(chain, &standoff, &seed, 1, &ik_settings(0), stream));
+    }
     let line: Vec<Pose> =
         (1..APPROACH_WAYPOINTS).map(|i| interpolate(&standoff, &grasp, i as f64 / (APPROACH_WAYPOINTS - 1) as f64)).collect();
-    let part_from_tool = part_motion[0].inverse() * pose.world_from_tool;
-    let carried: Vec<Pose> =
-        part_motion[1..].iter().map(|world_from_part| base_from_world * world_from_part * part_from_tool).collect();
-    let preferred = preferred_approach(simulation, config, (index, part), &pose.world_from_tool);
+    let place = usize::from(part.0);
+    let part_from_tool = motion[0][place].inverse() * pose.world_from_tool;
+    let carried: Vec<Pose> = motion[1..].iter().map(|parts| base_from_world * parts[place] * part_from_tool).collect();
+    let preferred = preferred_approach(simulation, config, (index, part), &motion[0], &pose.world_from_tool);
     let deviation = (pose.world_from_tool.rotation * Vector3::z() - preferred).norm_squared();
     let home = &simulation.scene.robots[index].home;
     let reach = |start: Vec<f64>| {
@@ -202,92 +207,14 @@ fn preferred_approach(
     simulation: &Simulation<'_>,
     config: &GraspConfig,
     (arm, part): (usize, PartId),
+    world_from_parts: &[Pose],
     world_from_tool: &Pose,
 ) -> Vector3<f64> {
     let level = |v: Vector3<f64>| Vector3::new(v.x, v.y, 0.0).try_normalize(1e-9).unwrap_or_else(Vector3::zeros);
     let here = world_from_tool.translation.vector;
     let forward = level(here - simulation.scene.world_from_bases[arm].translation.vector);
-    let others = simulation.hold_centers().into_iter().enumerate().filter(|(other, _)| *other != usize::from(part.0));
+    let centers = simulation.scene.hold_centers.iter().zip(world_from_parts).map(|(center, part)| part * center);
+    let others = centers.enumerate().filter(|(other, _)| *other != usize::from(part.0));
     let inward: Vector3<f64> = others.map(|(_, center)| level(center.coords - here)).sum();
     (forward * config.lean_forward + level(inward) * config.lean_inward - Vector3::z()).normalize()
-}
-
-/// Choices of one grasp for each arm such that nothing meets at the stand-offs, at the grasps or along the motion.
-///
-/// Combinations are tried by total cost; the first few that are free are returned, best first, for the planner.
-pub(crate) fn compatible_grasps(
-    simulation: &Simulation<'_>,
-    config: &GraspConfig,
-    candidates: &[Vec<Grasp>],
-    holders: &[(usize, usize)],
-) -> Result<Vec<Vec<Grasp>>, Failure> {
-    let mut openings: Vec<f64> = (0..simulation.scene.robots.len()).map(|arm| simulation.opening(arm)).collect();
-    for grasps in candidates {
-        openings[usize::from(grasps[0].arm.0)] = grasps.iter().map(|grasp| grasp.opening).fold(0.0, f64::max);
-    }
-    let grasped = candidates.iter().map(|grasps| (usize::from(grasps[0].arm.0), usize::from(grasps[0].part.0)));
-    let touching: Vec<(usize, usize)> = holders.iter().copied().chain(grasped).collect();
-    let worlds = [
-        collision_world(simulation, &openings, &Obstacles::Parts(holders)),
-        collision_world(simulation, &openings, &Obstacles::Parts(&touching)),
-        collision_world(simulation, &openings, &Obstacles::Nothing),
-    ];
-    let [mut standoff, mut grasp, mut carry] = worlds.each_ref().map(CollisionChecker::new);
-    let mut blocked = String::new();
-    let mut free = Vec::new();
-    for combination in cheapest_combinations(candidates, config.shortlist) {
-        let chosen: Vec<&Grasp> = combination.iter().zip(candidates).map(|(&index, grasps)| &grasps[index]).collect();
-        let with = |phase: &dyn Fn(&Grasp) -> Vec<f64>| joint_positions_with(simulation, &chosen, phase);
-        let at_standoff = standoff.check(&with(&|grasp| grasp.standoff().to_vec()), config.plan_margin);
-        let mut at_grasp = || grasp.check(&with(&|grasp| grasp.grasp().to_vec()), config.table_clearance / 2.0);
-        let mut waypoints = (0..chosen[0].carried.len()).rev();
-        let mut carried = || waypoints.find_map(|i| carry.check(&with(&|grasp| grasp.carried[i].clone()), config.carry_margin));
-        let hit = at_standoff
-            .map(|pair| ("before the grasp", pair))
-            .or_else(|| at_grasp().map(|pair| ("at the grasp", pair)))
-            .or_else(|| carried().map(|pair| ("on the way to the goal", pair)));
-        match hit {
-            None => free.push(chosen.into_iter().cloned().collect()),
-            Some((when, pair)) => blocked = format!("{when} {pair}"),
-        }
-        if free.len() >= PLANNED_COMBINATIONS {
-            break;
-        }
-    }
-    if free.is_empty() {
-        return Err(Failure::new(FailureStage::NoPlan, format!("no free combination of gripper poses; last: {blocked}")));
-    }
-    Ok(free)
-}
-
-/// Indices of one candidate for each arm, in the order of their total cost, over each arm's `shortlist` cheapest.
-fn cheapest_combinations(candidates: &[Vec<Grasp>], shortlist: usize) -> Vec<Vec<usize>> {
-    let mut combinations: Vec<(f64, Vec<usize>)> = vec![(0.0, Vec::new())];
-    for grasps in candidates {
-        let mut longer = Vec::new();
-        for (cost, chosen) in &combinations {
-            for (next, grasp) in grasps.iter().enumerate().take(shortlist) {
-                longer.push((cost + grasp.cost, chosen.iter().copied().chain([next]).collect()));
-            }
-        }
-        longer.sort_by(|a, b| a.0.total_cmp(&b.0));
-        // With many arms only the cheapest partial choices are extended further.
-        longer.truncate(shortlist * shortlist);
-        combinations = longer;
-    }
-    combinations.into_iter().map(|(_, chosen)| chosen).collect()
-}
-
-/// Joint positions of all arms (flat), those of the grasping arms taken by `phase`, the others as they are now.
-pub(crate) fn joint_positions_with(
-    simulation: &Simulation<'_>,
-    grasps: &[&Grasp],
-    phase: &dyn Fn(&Grasp) -> Vec<f64>,
-) -> Vec<f64> {
-    let arms = 0..simulation.scene.robots.len();
-    arms.flat_map(|arm| match grasps.iter().find(|grasp| usize::from(grasp.arm.0) == arm) {
-        Some(grasp) => phase(grasp),
-        None => simulation.joint_positions(arm).as_slice().to_vec(),
-    })
-    .collect()
 }

@@ -1,7 +1,9 @@
 //! Physics: scenes, cameras, control and the one trial loop, on MuJoCo. Knows nothing of tensors.
 
+mod assignment;
 mod attempt;
 mod cameras;
+mod combinations;
 mod convention;
 mod error;
 mod execution;

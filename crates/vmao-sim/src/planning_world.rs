@@ -17,13 +17,21 @@ pub(crate) enum Obstacles<'a> {
 
 /// The collision world of the scene now, each gripper open by `openings` (m).
 pub(crate) fn collision_world(simulation: &Simulation<'_>, openings: &[f64], obstacles: &Obstacles<'_>) -> CollisionWorld {
-    let scene = simulation.scene;
+    collision_world_at(simulation.scene, &simulation.object_state().world_from_parts, openings, obstacles)
+}
+
+/// The same with the object's parts at `world_from_parts`.
+pub(crate) fn collision_world_at(
+    scene: &Scene,
+    world_from_parts: &[Pose],
+    openings: &[f64],
+    obstacles: &Obstacles<'_>,
+) -> CollisionWorld {
     let arms = (0..scene.robots.len()).map(|arm| arm_model(scene, arm, openings[arm])).collect();
     let mut world = CollisionWorld { arms, ..CollisionWorld::default() };
     if let Obstacles::Parts(holders) = obstacles {
         world.floor_height = Some(0.0);
-        let state = simulation.object_state();
-        for (part, (description, world_from_part)) in scene.object.parts.iter().zip(&state.world_from_parts).enumerate() {
+        for (part, (description, world_from_part)) in scene.object.parts.iter().zip(world_from_parts).enumerate() {
             for solid in &description.solids {
                 let obstacle = world.obstacles.len();
                 world.allowed.extend(holders.iter().filter(|(_, held)| *held == part).map(|(arm, _)| (*arm, obstacle)));
@@ -34,6 +42,14 @@ pub(crate) fn collision_world(simulation: &Simulation<'_>, openings: &[f64], obs
             }
         }
     }
+    world
+}
+
+/// What `world` is to one of its arms if the others were not there; it becomes arm 0.
+pub(crate) fn with_one_arm(mut world: CollisionWorld, arm: usize) -> CollisionWorld {
+    world.arms = vec![world.arms.swap_remove(arm)];
+    world.allowed.retain(|(holder, _)| *holder == arm);
+    world.allowed.iter_mut().for_each(|(holder, _)| *holder = 0);
     world
 }
 

@@ -105,6 +105,8 @@ pub struct Scene {
     pub demonstrations: Vec<ContactTuple>,
     /// Where the demonstrations hold each part on average, part frame (m).
     pub(crate) hold_centers: Vec<Point3<f64>>,
+    /// Where the demonstrations put finger 1 and finger 2 on each part on average, part frame (m).
+    pub(crate) hold_fingers: Vec<[Point3<f64>; 2]>,
     /// Its graph.
     pub graph: ObjectGraph,
     /// The dependency root of its motions.
@@ -126,7 +128,8 @@ pub struct Scene {
 impl Scene {
     /// Compiles the scene. Fails if the simulator refuses the model.
     pub fn new(config: &SceneConfig, robots: Vec<RobotModel>, item: CatalogueItem) -> Result<Self, Error> {
-        let hold_centers = hold_centers(&item);
+        let hold_fingers = hold_fingers(&item);
+        let hold_centers = hold_fingers.iter().map(|[a, b]| nalgebra::center(a, b)).collect();
         let CatalogueItem { object, demonstrations } = item;
         let graph = ObjectGraph::of(&object).map_err(|cause| Error::Object { name: object.name.clone(), cause })?;
         if robots.len() != object.parts.len() {
@@ -157,6 +160,7 @@ impl Scene {
             object,
             demonstrations,
             hold_centers,
+            hold_fingers,
             graph,
             root: PartId(0),
             mjcf,
@@ -172,16 +176,14 @@ impl Scene {
     }
 }
 
-/// The mean of all demonstrated finger points on each part; the part's origin where there is none.
-fn hold_centers(item: &CatalogueItem) -> Vec<Point3<f64>> {
-    (0..item.object.parts.len())
-        .map(|part| {
-            let contacts = item.demonstrations.iter().flatten().filter(|contact| usize::from(contact.part.0) == part);
-            let points: Vec<Point3<f64>> = contacts.flat_map(|contact| contact.fingers).collect();
-            let sum: Vector3<f64> = points.iter().map(|point| point.coords).sum();
-            Point3::from(sum / points.len().max(1) as f64)
-        })
-        .collect()
+/// The means of all demonstrated points of finger 1 and of finger 2 on each part; the part's origin where there is none.
+fn hold_fingers(item: &CatalogueItem) -> Vec<[Point3<f64>; 2]> {
+    let mean = |part: usize, finger: usize| {
+        let contacts = item.demonstrations.iter().flatten().filter(|contact| usize::from(contact.part.0) == part);
+        let points: Vec<Vector3<f64>> = contacts.map(|contact| contact.fingers[finger].coords).collect();
+        Point3::from(points.iter().sum::<Vector3<f64>>() / points.len().max(1) as f64)
+    };
+    (0..item.object.parts.len()).map(|part| [mean(part, 0), mean(part, 1)]).collect()
 }
 
 /// Base poses of `count` arms; all face the table's centre.

@@ -3,7 +3,7 @@
 use crate::convention::{Data, body_pose, free_joint_position, hinge_jacobian, joint_vector, mass_block};
 use crate::recorder::Recorder;
 use crate::scene::{Owner, Scene};
-use nalgebra::{Point3, Vector6};
+use nalgebra::Vector6;
 use vmao_core::contact::{ArmId, PartId};
 use vmao_core::geometry::Pose;
 use vmao_core::kinematics::SerialChain;
@@ -160,11 +160,6 @@ impl<'s> Simulation<'s> {
         }
     }
 
-    /// Where each part is usually held, world frame (m).
-    pub(crate) fn hold_centers(&self) -> Vec<Point3<f64>> {
-        hold_centers(self.scene, &self.object_state())
-    }
-
     /// The fastest motion of the object: over its free body (m/s and rad/s mixed) and its joints.
     pub(crate) fn object_speed(&self) -> f64 {
         let joints = self.scene.joint_addresses.iter().flatten().map(|(_, dof)| *dof);
@@ -212,9 +207,4 @@ fn describe(owner: Owner) -> String {
         Owner::Link(arm) | Owner::Pad(arm, _) => format!("arm {}", arm.0),
         Owner::Part(part) => format!("part {}", part.0),
     }
-}
-
-/// Where each part is usually held when the object is in `state`, world frame (m).
-pub(crate) fn hold_centers(scene: &Scene, state: &ObjectState) -> Vec<Point3<f64>> {
-    scene.hold_centers.iter().zip(&state.world_from_parts).map(|(center, world_from_part)| world_from_part * center).collect()
 }
