@@ -172,6 +172,10 @@ impl<'a> Attempt<'a> {
             let fingers = model
                 .propose(&query, &mut stream)
                 .ok_or_else(|| Failure::new(FailureStage::NoContact, format!("nothing to touch was seen on part {grasp}")))?;
+            if fingers.iter().flat_map(|point| point.iter()).any(|value| !value.is_finite()) {
+                let why = format!("the points proposed on part {grasp} are not finite: {} and {}", fingers[0], fingers[1]);
+                return Err(Failure::new(FailureStage::NoContact, why));
+            }
             let contact = Contact { part, fingers: fingers.map(|point| world_from_part.inverse_transform_point(&point)) };
             let (arm, observation) = (self.arms[grasp], observation.clone());
             self.grasps.push(GraspRecord { arm, contact, observation, world_from_part, world_from_gripper: None });

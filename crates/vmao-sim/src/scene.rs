@@ -86,7 +86,6 @@ pub(crate) struct ArmIndex {
     pub(crate) dof: usize,
     pub(crate) ctrl: usize,
     pub(crate) finger_qpos: usize,
-    pub(crate) finger_dof: usize,
     pub(crate) hand_body: usize,
     pub(crate) bodies: Vec<usize>,
     pub(crate) max_torque: JointVector,
@@ -220,7 +219,7 @@ fn arm_index(model: &MjModel, arm: usize, robot: &RobotModel) -> Result<ArmIndex
     let joints =
         (0..JOINTS).map(|index| id(model, MjtObjBase::mjOBJ_JOINT, &joint_name(index))).collect::<Result<Vec<_>, _>>()?;
     let (qpos, dof) = addresses(model, &joint_name(0))?;
-    let (finger_qpos, finger_dof) = addresses(model, &mjcf::arm_name(arm, "finger1"))?;
+    let (finger_qpos, _) = addresses(model, &mjcf::arm_name(arm, "finger1"))?;
     let gripper = &robot.gripper;
     let mut names = vec![robot.base.name];
     names.extend(robot.joints.iter().map(|joint| joint.link.name));
@@ -234,7 +233,6 @@ fn arm_index(model: &MjModel, arm: usize, robot: &RobotModel) -> Result<ArmIndex
         dof,
         ctrl: id(model, MjtObjBase::mjOBJ_ACTUATOR, &joint_name(0))?,
         finger_qpos,
-        finger_dof,
         hand_body: id(model, MjtObjBase::mjOBJ_BODY, &mjcf::arm_name(arm, gripper.hand.name))?,
         bodies,
         max_torque: JointVector::from_iterator(robot.joints.iter().map(|joint| joint.max_torque)),

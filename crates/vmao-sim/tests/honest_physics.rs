@@ -1,0 +1,150 @@
+//! Grasps hold by closing force and friction alone: without either, the trial that succeeds fails.
+
+mod support;
+
+use mujoco_rs::wrappers::mj_data::MjData;
+use mujoco_rs::wrappers::mj_model::{MjModel, MjtEq, MjtJoint, MjtObjBase, MjtTrn};
+use support::{configuration, demonstrated_trial, failed_at, first_success, scene, scene_with, slippery};
+use vmao_core::order::GraspOrder;
+use vmao_core::outcome::FailureStage;
+use vmao_core::robots::panda;
+
+fn check_that_grasping_matters(order: GraspOrder) {
+    let (physics, config) = configuration();
+    let scene = scene_with(&physics, 0);
+    let success = first_success(&scene, &config, order);
+    let index = success.record.index;
+    assert!(success.threshold_factor <= 1.0 && success.record.detail.is_empty());
+
+    let ice = demonstrated_trial(&scene_with(&slippery(&physics, 0.05), 0), &config, order, index);
+    let lost = [FailureStage::Slip, FailureStage::NoContact, FailureStage::Threshold];
+    assert!(lost.contains(&failed_at(&ice)), "trial {index} on ice: {:?} {}", ice.record.outcome, ice.record.detail);
+
+    let mut open = config.clone();
+    open.grasp.closing_share = 0.0;
+    let open = demonstrated_trial(&scene, &open, order, index);
+    assert_eq!(failed_at(&open), FailureStage::NoContact, "{}", open.record.detail);
+    assert_eq!(open.record.goal, success.record.goal, "the same trial");
+    assert!(open.record.grasps[0].world_from_gripper.is_some(), "the open gripper went to its grasp");
+}
+
+#[test]
+fn in_parallel_order_nothing_holds_without_friction_or_without_closing() {
+    check_that_grasping_matters(GraspOrder::Parallel);
+}
+
+#[test]
+fn in_sequential_order_nothing_holds_without_friction_or_without_closing() {
+    check_that_grasping_matters(GraspOrder::Sequential);
+}
+
+fn model() -> MjModel {
+    MjModel::from_xml_string(&scene(0).mjcf).unwrap()
+}
+
+fn name_of(model: &MjModel, kind: MjtObjBase, id: usize) -> String {
+    model.id_to_name(kind, id).unwrap_or("").to_owned()
+}
+
+#[test]
+fn nothing_is_welded_carried_or_glued() {
+    let model = model();
+    for (index, kind) in model.eq_type().iter().enumerate() {
+        assert_eq!(*kind, MjtEq::mjEQ_JOINT);
+        for joint in [model.eq_obj1id()[index], model.eq_obj2id()[index]] {
+            let name = name_of(&model, MjtObjBase::mjOBJ_JOINT, joint as usize);
+            assert!(name.contains("finger"), "equality {index} is on {name}");
+        }
+    }
+    assert_eq!(model.eq_type().len(), 2, "one coupling a gripper");
+    assert!(model.body_mocapid().iter().all(|&id| id < 0), "no mocap body");
+    assert!(model.geom_adhesion().iter().all(|&force| force == 0.0), "no sticky geom");
+    assert!(model.geom_surfacevel().iter().flatten().all(|&speed| speed == 0.0), "no conveyor");
+    assert!(model.body_gravcomp().iter().all(|&share| share == 0.0), "all weight is carried");
+    assert!(model.actuator_trntype().iter().all(|&kind| kind == MjtTrn::mjTRN_JOINT), "actuators drive joints only");
+    assert!(model.jnt_stiffness().iter().all(|&stiffness| stiffness == 0.0), "no springs");
+    let free = model.jnt_type().iter().filter(|&&kind| kind == MjtJoint::mjJNT_FREE).count();
+    assert_eq!(free, 1, "the object is free and nothing else");
+    assert_eq!(model.ffi().ntendon, 0);
+    assert_eq!(model.ffi().nplugin, 0);
+}
+
+#[test]
+fn friction_and_gravity_are_those_of_the_world() {
+    let model = model();
+    for (geom, [sliding, torsional, rolling]) in model.geom_friction().iter().enumerate() {
+        let name = name_of(&model, MjtObjBase::mjOBJ_GEOM, geom);
+        assert!((0.1..=1.0).contains(sliding), "{name} slides at {sliding}");
+        assert!(*torsional <= 0.003, "{name} resists turning by {torsional} m");
+        assert!(*rolling <= 0.0001, "{name} resists rolling by {rolling} m");
+    }
+    assert_eq!(model.opt().gravity, [0.0, 0.0, -9.81]);
+    assert_eq!(model.opt().disableflags, 0, "nothing of the physics is switched off");
+    assert_eq!((model.opt().viscosity, model.opt().density, model.opt().wind), (0.0, 0.0, [0.0; 3]));
+}
+
+#[test]
+fn contacts_are_on_between_everything_that_may_touch() {
+    let model = model();
+    for geom in 0..model.geom_bodyid().len() {
+        let name = name_of(&model, MjtObjBase::mjOBJ_GEOM, geom);
+        assert_eq!((model.geom_contype()[geom], model.geom_conaffinity()[geom]), (1, 1), "{name}");
+        assert_eq!((model.geom_margin()[geom], model.geom_gap()[geom]), (0.0, 0.0), "{name} acts at a distance");
+    }
+}
+
+#[test]
+fn actuators_are_as_strong_as_the_robot_and_no_stronger() {
+    let model = model();
+    let robot = panda();
+    for arm in 0..2 {
+        for (index, joint) in robot.joints.iter().enumerate() {
+            let name = format!("arm{arm}/joint{}", index + 1);
+            let actuator = model.name_to_id(MjtObjBase::mjOBJ_ACTUATOR, &name).unwrap();
+            assert_eq!(model.actuator_ctrlrange()[actuator], [-joint.max_torque, joint.max_torque], "{name}");
+        }
+        let actuator = model.name_to_id(MjtObjBase::mjOBJ_ACTUATOR, &format!("arm{arm}/finger1")).unwrap();
+        let force = robot.gripper.max_force;
+        assert_eq!(model.actuator_ctrlrange()[actuator], [-2.0 * force, 2.0 * force]);
+    }
+    assert_eq!(model.actuator_ctrlrange().len(), 16);
+    assert!(model.actuator_ctrllimited().iter().all(|&limited| limited));
+    let unit = |gear: &[f64; 6]| *gear == [1.0, 0.0, 0.0, 0.0, 0.0, 0.0];
+    assert!(model.actuator_gear().iter().all(unit), "controls are torques");
+}
+
+#[test]
+fn masses_are_those_of_real_things() {
+    for instance in 0..6 {
+        let scene = scene(instance);
+        let model = MjModel::from_xml_string(&scene.mjcf).unwrap();
+        let body = |name: &str| model.name_to_id(MjtObjBase::mjOBJ_BODY, name).unwrap();
+        let object = model.body_subtreemass()[body("object/lever-a")];
+        let described: f64 = scene.object.parts.iter().map(|part| part.mass).sum();
+        assert!((0.15..=0.3).contains(&object), "the pliers weigh {object} kg");
+        assert!((object - described).abs() < 1e-9);
+        for arm in 0..2 {
+            let mass = model.body_subtreemass()[body(&format!("arm{arm}/link0"))];
+            assert!((17.0..=18.0).contains(&mass), "an arm weighs {mass} kg");
+        }
+        for index in 1..model.body_mass().len() {
+            let name = name_of(&model, MjtObjBase::mjOBJ_BODY, index);
+            assert!(model.body_mass()[index] >= 0.015 - 1e-12, "{name} weighs {}", model.body_mass()[index]);
+            assert!(model.body_inertia()[index].iter().all(|&moment| moment > 0.0), "{name} has no inertia");
+        }
+    }
+}
+
+#[test]
+fn the_written_scene_runs_in_the_simulator_alone() {
+    let model = model();
+    let mut data = MjData::new(&model);
+    for _ in 0..500 {
+        data.step();
+    }
+    assert!(data.qpos().iter().chain(data.qvel()).all(|value| value.is_finite()));
+    for (kind, warning) in data.warning().iter().enumerate() {
+        assert_eq!(warning.number, 0, "warning {kind}");
+    }
+    assert!((data.time() - 1.0).abs() < 1e-9);
+}
