@@ -233,7 +233,12 @@ impl<'a> Attempt<'a> {
             let fingers = self.scene.hold_fingers[part].map(|point| world_from_parts[part] * point);
             let (arm, place) = (arms[part], PartId(part as u16));
             // Cheaper than the later search itself: few postures of each gripper pose.
-            let config = GraspConfig { ik_candidates: 1, ik_restarts: 1, ..self.config.grasp.clone() };
+            let config = GraspConfig {
+                approaches: self.config.grasp.approaches / 2,
+                ik_candidates: 1,
+                ik_restarts: 1,
+                ..self.config.grasp.clone()
+            };
             let reached = reachable_grasps(&self.simulation, &config, (arm, place), (&[], &fingers), &motion, stream);
             let reached = reached.unwrap_or_default();
             grasps.push(free_alone(&self.simulation, &config, &self.holders(), &world_from_parts, reached));
