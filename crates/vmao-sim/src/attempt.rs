@@ -4,7 +4,7 @@ use crate::assignment::assignments;
 use crate::cameras::observe;
 use crate::combinations::{Choices, Reserve, compatible_grasps, free_alone, joint_positions_with};
 use crate::failure::Failure;
-use crate::grasping::{Grasp, MAX_JOINT_STEP, ik_settings, object_cloud, reachable_grasps};
+use crate::grasping::{Grasp, GraspConfig, MAX_JOINT_STEP, ik_settings, object_cloud, reachable_grasps};
 use crate::planning_world::{Obstacles, collision_world};
 use crate::recorder::Recorder;
 use crate::scene::Scene;
@@ -16,7 +16,7 @@ use std::ops::Range;
 use vmao_core::collision::CollisionChecker;
 use vmao_core::contact::{ArmId, Contact, PartId};
 use vmao_core::contact_model::{ContactModel, ContactQuery};
-use vmao_core::geometry::{Pose, rotation_distance};
+use vmao_core::geometry::{Pose, interpolate, rotation_distance};
 use vmao_core::inverse_kinematics::track;
 use vmao_core::object::{ObjectGoal, ObjectState};
 use vmao_core::object_centric::{ObjectTrajectory, part_poses};
@@ -47,6 +47,8 @@ const SETTLE_AFTER_MOTION: f64 = 0.3;
 const SETTLE_AT_GOAL: f64 = 0.5;
 /// First leg of the alternative route: straight up by this much (m).
 const LIFT_FIRST: f64 = 0.07;
+/// Steps in which the motion after a later grasp is looked at.
+const RESERVE_WAYPOINTS: usize = 4;
 
 /// Joint trajectories to the stand-offs and from there to the grasps.
 pub(crate) struct Approach {
@@ -225,14 +227,25 @@ impl<'a> Attempt<'a> {
     /// How the parts from `next` on could be taken where the object is after `motion`: as demonstrated, on average.
     fn reserve(&self, arms: &[ArmId], next: usize, motion: &[Vec<Pose>], stream: &mut Stream) -> Reserve {
         let world_from_parts = motion[motion.len() - 1].clone();
-        let motion = [world_from_parts.clone(), self.goal_parts.clone()];
+        let between = |share: f64| {
+            let ends = world_from_parts.iter().zip(&self.goal_parts);
+            ends.map(|(from, to)| interpolate(from, to, share)).collect()
+        };
+        let motion: Vec<Vec<Pose>> = (0..=RESERVE_WAYPOINTS).map(|i| between(i as f64 / RESERVE_WAYPOINTS as f64)).collect();
         let mut grasps = Vec::new();
         for part in next..self.part_count() {
             let fingers = self.scene.hold_fingers[part].map(|point| world_from_parts[part] * point);
             let (arm, place) = (arms[part], PartId(part as u16));
-            let reached = reachable_grasps(&self.simulation, &self.config.grasp, (arm, place), (&[], &fingers), &motion, stream);
+            // Cheaper than the later search itself: few postures of each gripper pose.
+            let config = GraspConfig {
+                approaches: self.config.grasp.approaches / 2,
+                ik_candidates: 1,
+                ik_restarts: 1,
+                ..self.config.grasp.clone()
+            };
+            let reached = reachable_grasps(&self.simulation, &config, (arm, place), (&[], &fingers), &motion, stream);
             let reached = reached.unwrap_or_default();
-            grasps.push(free_alone(&self.simulation, &self.config.grasp, &self.holders(), &world_from_parts, reached));
+            grasps.push(free_alone(&self.simulation, &config, &self.holders(), &world_from_parts, reached));
         }
         Reserve { world_from_parts, grasps }
     }
