@@ -96,7 +96,7 @@ impl<'a> Attempt<'a> {
         let goal = sample_goal(scene, &config.goal, &start, scene.root, &mut draw(Draw::Goal));
         let goal_parts = part_poses(&scene.object, &graph, goal.root, &goal.world_from_root, &goal.joint_positions);
         if recording == Recording::On {
-            simulation.recorder = Some(Recorder::new(scene, goal_parts.clone()));
+            simulation.recorder = Some(Recorder::new(&simulation, goal_parts.clone()));
         }
         let errors = goal_errors(scene, &goal_parts, &goal, &start);
         let arms = nearest_arms(scene, &start);
@@ -130,9 +130,9 @@ impl<'a> Attempt<'a> {
     }
 
     fn note(&mut self, label: String) {
-        let time = self.simulation.time();
+        let steps = self.simulation.steps;
         if let Some(recorder) = &mut self.simulation.recorder {
-            recorder.event(time, label);
+            recorder.event(steps, label);
         }
     }
 
@@ -177,9 +177,9 @@ impl<'a> Attempt<'a> {
             let contact = Contact { part, fingers: fingers.map(|point| world_from_part.inverse_transform_point(&point)) };
             let (arm, observation) = (self.arms[grasp], observation.clone());
             self.grasps.push(GraspRecord { arm, contact, observation, world_from_part, world_from_gripper: None });
-            let time = self.simulation.time();
+            let steps = self.simulation.steps;
             if let Some(recorder) = &mut self.simulation.recorder {
-                recorder.rollout.contacts.push((time, arm.0, fingers[0].into(), fingers[1].into()));
+                recorder.contact(steps, arm.0, &fingers);
             }
             contacts.push(fingers);
         }
