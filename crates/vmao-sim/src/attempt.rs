@@ -52,6 +52,9 @@ pub(crate) struct Approach {
     last_stretch: Trajectory,
 }
 
+/// Joint positions (rad) of each holding arm at each waypoint of a motion.
+type Postures = Vec<Vec<Vec<f64>>>;
+
 /// A trial under way.
 pub(crate) struct Attempt<'a> {
     scene: &'a Scene,
@@ -336,7 +339,7 @@ impl<'a> Attempt<'a> {
     }
 
     /// The object's trajectory to `goal` and the joint positions of each holding arm along it, free of collision.
-    fn plan_carry(&self, goal: &ObjectGoal) -> Result<(ObjectTrajectory, Vec<Vec<Vec<f64>>>), Failure> {
+    fn plan_carry(&self, goal: &ObjectGoal) -> Result<(ObjectTrajectory, Postures), Failure> {
         let trajectory = self.trajectory(goal.clone());
         let waypoints = self.waypoints(&trajectory);
         let mut postures = Vec::new();
@@ -346,7 +349,7 @@ impl<'a> Attempt<'a> {
             let part_from_tool = waypoints[0][part].inverse() * self.simulation.tool_pose(index);
             let poses: Vec<Pose> = waypoints[1..].iter().map(|parts| base_from_world * parts[part] * part_from_tool).collect();
             let now = self.simulation.joint_positions(index).as_slice().to_vec();
-            let way = track(&self.simulation.chains[index], &poses, &now, MAX_JOINT_STEP, &ik_settings(0)).map_err(|_| {
+            let way = track(&self.simulation.chains[index], &poses, &now, MAX_JOINT_STEP, &ik_settings(0)).map_err(|_where| {
                 Failure::new(FailureStage::Unreachable, format!("arm {index} cannot follow the object to its goal"))
             })?;
             postures.push(std::iter::once(now).chain(way).collect::<Vec<_>>());

@@ -1,5 +1,6 @@
 //! What all tests of this crate run on: one configuration, the pliers, two Pandas, and contact models of their own.
 #![allow(dead_code, reason = "each test binary uses its own share of this module")]
+#![allow(clippy::unwrap_used, clippy::panic, reason = "a test that cannot go on has failed")]
 
 use nalgebra::Point3;
 use vmao_core::catalogue::{InstanceSet, item};
