@@ -56,6 +56,9 @@ pub(crate) struct Approach {
     last_stretch: Trajectory,
 }
 
+/// Joint positions (rad) of each holding arm at each waypoint of a motion.
+type Postures = Vec<Vec<Vec<f64>>>;
+
 /// A trial under way.
 pub(crate) struct Attempt<'a> {
     scene: &'a Scene,
@@ -100,7 +103,7 @@ impl<'a> Attempt<'a> {
         let goal = sample_goal(scene, &config.goal, &start, scene.root, &mut draw(Draw::Goal));
         let goal_parts = part_poses(&scene.object, &graph, goal.root, &goal.world_from_root, &goal.joint_positions);
         if recording == Recording::On {
-            simulation.recorder = Some(Recorder::new(scene, goal_parts.clone()));
+            simulation.recorder = Some(Recorder::new(&simulation, goal_parts.clone()));
         }
         let errors = goal_errors(scene, &goal_parts, &goal, &start);
         let arms = assignments(scene, &[], &[&start.world_from_parts, &goal_parts]).remove(0);
@@ -134,9 +137,9 @@ impl<'a> Attempt<'a> {
     }
 
     fn note(&mut self, label: String) {
-        let time = self.simulation.time();
+        let steps = self.simulation.steps;
         if let Some(recorder) = &mut self.simulation.recorder {
-            recorder.event(time, label);
+            recorder.event(steps, label);
         }
     }
 
@@ -181,9 +184,9 @@ impl<'a> Attempt<'a> {
             let contact = Contact { part, fingers: fingers.map(|point| world_from_part.inverse_transform_point(&point)) };
             let (arm, observation) = (self.arms[grasp], observation.clone());
             self.grasps.push(GraspRecord { arm, contact, observation, world_from_part, world_from_gripper: None });
-            let time = self.simulation.time();
+            let steps = self.simulation.steps;
             if let Some(recorder) = &mut self.simulation.recorder {
-                recorder.rollout.contacts.push((time, arm.0, fingers[0].into(), fingers[1].into()));
+                recorder.contact(steps, arm.0, &fingers);
             }
             contacts.push(fingers);
         }
@@ -392,7 +395,7 @@ impl<'a> Attempt<'a> {
     }
 
     /// The object's trajectory to `goal` and the joint positions of each holding arm along it, free of collision.
-    fn plan_carry(&self, goal: &ObjectGoal) -> Result<(ObjectTrajectory, Vec<Vec<Vec<f64>>>), Failure> {
+    fn plan_carry(&self, goal: &ObjectGoal) -> Result<(ObjectTrajectory, Postures), Failure> {
         let trajectory = self.trajectory(goal.clone());
         let waypoints = self.waypoints(&trajectory);
         let mut postures = Vec::new();
@@ -402,7 +405,7 @@ impl<'a> Attempt<'a> {
             let part_from_tool = waypoints[0][part].inverse() * self.simulation.tool_pose(index);
             let poses: Vec<Pose> = waypoints[1..].iter().map(|parts| base_from_world * parts[part] * part_from_tool).collect();
             let now = self.simulation.joint_positions(index).as_slice().to_vec();
-            let way = track(&self.simulation.chains[index], &poses, &now, MAX_JOINT_STEP, &ik_settings(0)).map_err(|_| {
+            let way = track(&self.simulation.chains[index], &poses, &now, MAX_JOINT_STEP, &ik_settings(0)).map_err(|_where| {
                 Failure::new(FailureStage::Unreachable, format!("arm {index} cannot follow the object to its goal"))
             })?;
             postures.push(std::iter::once(now).chain(way).collect::<Vec<_>>());
