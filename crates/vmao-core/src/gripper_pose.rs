@@ -89,16 +89,17 @@ pub fn squared(fingers: &[Point3<f64>; 2], points: &[Point3<f64>], limit: f64) -
     if direction.dot(&along) < along.norm() * limit.cos() {
         return None;
     }
-    let half = direction * (along.norm() / 2.0);
+    // Only the distance across the bar says how far to open; what the points differ along it does not.
+    let half = direction * (along.dot(&direction) / 2.0);
     Some([middle + half, middle - half])
 }
 
 /// Cloud points within this distance of the contacts' middle show the bar's direction (m) ...
-const BAR_NEIGHBOURHOOD: f64 = 0.028;
+const BAR_NEIGHBOURHOOD: f64 = 0.035;
 /// ... if there are at least so many ...
 const FEWEST_BAR_POINTS: usize = 12;
 /// ... and their longest variance is this many times the next.
-const BAR_ELONGATION: f64 = 2.0;
+const BAR_ELONGATION: f64 = 1.6;
 
 #[cfg(test)]
 mod tests {
