@@ -1,4 +1,5 @@
 //! The operational space controller against its closed forms, on random configurations of the Panda.
+#![expect(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
 use nalgebra::{SMatrix, Vector3, Vector6};
 use vmao_core::geometry::{Pose, rotation_exp};
@@ -45,11 +46,7 @@ fn near_goal(state: &ArmState, stream: &mut Stream) -> GripperGoal {
     let mut world_from_tool = state.world_from_tool;
     world_from_tool.translation.vector += vector(stream, 0.02);
     world_from_tool.rotation = rotation_exp(&vector(stream, 0.1)) * world_from_tool.rotation;
-    GripperGoal {
-        world_from_tool,
-        twist: Vector6::from_fn(|_, _| stream.range(-0.3, 0.3)),
-        posture: random_vector(stream, 2.0),
-    }
+    GripperGoal { world_from_tool, twist: Vector6::from_fn(|_, _| stream.range(-0.3, 0.3)), posture: random_vector(stream, 2.0) }
 }
 
 /// Acceleration of the tool that torques beyond the bias cause: J M⁻¹ (τ − h).

@@ -4,7 +4,7 @@ use crate::assignment::assignments;
 use crate::cameras::observe;
 use crate::combinations::{Choices, Reserve, compatible_grasps, free_alone, joint_positions_with};
 use crate::failure::Failure;
-use crate::grasping::{Grasp, MAX_JOINT_STEP, ik_settings, object_cloud, reachable_grasps};
+use crate::grasping::{Grasp, GraspConfig, MAX_JOINT_STEP, ik_settings, object_cloud, reachable_grasps};
 use crate::planning_world::{Obstacles, collision_world};
 use crate::recorder::Recorder;
 use crate::scene::Scene;
@@ -16,7 +16,7 @@ use std::ops::Range;
 use vmao_core::collision::CollisionChecker;
 use vmao_core::contact::{ArmId, Contact, PartId};
 use vmao_core::contact_model::{ContactModel, ContactQuery};
-use vmao_core::geometry::{Pose, rotation_distance};
+use vmao_core::geometry::{Pose, interpolate, rotation_distance};
 use vmao_core::inverse_kinematics::track;
 use vmao_core::object::{ObjectGoal, ObjectState};
 use vmao_core::object_centric::{ObjectTrajectory, part_poses};
@@ -47,12 +47,17 @@ const SETTLE_AFTER_MOTION: f64 = 0.3;
 const SETTLE_AT_GOAL: f64 = 0.5;
 /// First leg of the alternative route: straight up by this much (m).
 const LIFT_FIRST: f64 = 0.07;
+/// Steps in which the motion after a later grasp is looked at.
+const RESERVE_WAYPOINTS: usize = 4;
 
 /// Joint trajectories to the stand-offs and from there to the grasps.
 pub(crate) struct Approach {
     way: Trajectory,
     last_stretch: Trajectory,
 }
+
+/// Joint positions (rad) of each holding arm at each waypoint of a motion.
+type Postures = Vec<Vec<Vec<f64>>>;
 
 /// A trial under way.
 pub(crate) struct Attempt<'a> {
@@ -98,7 +103,7 @@ impl<'a> Attempt<'a> {
         let goal = sample_goal(scene, &config.goal, &start, scene.root, &mut draw(Draw::Goal));
         let goal_parts = part_poses(&scene.object, &graph, goal.root, &goal.world_from_root, &goal.joint_positions);
         if recording == Recording::On {
-            simulation.recorder = Some(Recorder::new(scene, goal_parts.clone()));
+            simulation.recorder = Some(Recorder::new(&simulation, goal_parts.clone()));
         }
         let errors = goal_errors(scene, &goal_parts, &goal, &start);
         let arms = assignments(scene, &[], &[&start.world_from_parts, &goal_parts]).remove(0);
@@ -132,9 +137,9 @@ impl<'a> Attempt<'a> {
     }
 
     fn note(&mut self, label: String) {
-        let time = self.simulation.time();
+        let steps = self.simulation.steps;
         if let Some(recorder) = &mut self.simulation.recorder {
-            recorder.event(time, label);
+            recorder.event(steps, label);
         }
     }
 
@@ -179,9 +184,9 @@ impl<'a> Attempt<'a> {
             let contact = Contact { part, fingers: fingers.map(|point| world_from_part.inverse_transform_point(&point)) };
             let (arm, observation) = (self.arms[grasp], observation.clone());
             self.grasps.push(GraspRecord { arm, contact, observation, world_from_part, world_from_gripper: None });
-            let time = self.simulation.time();
+            let steps = self.simulation.steps;
             if let Some(recorder) = &mut self.simulation.recorder {
-                recorder.rollout.contacts.push((time, arm.0, fingers[0].into(), fingers[1].into()));
+                recorder.contact(steps, arm.0, &fingers);
             }
             contacts.push(fingers);
         }
@@ -225,14 +230,25 @@ impl<'a> Attempt<'a> {
     /// How the parts from `next` on could be taken where the object is after `motion`: as demonstrated, on average.
     fn reserve(&self, arms: &[ArmId], next: usize, motion: &[Vec<Pose>], stream: &mut Stream) -> Reserve {
         let world_from_parts = motion[motion.len() - 1].clone();
-        let motion = [world_from_parts.clone(), self.goal_parts.clone()];
+        let between = |share: f64| {
+            let ends = world_from_parts.iter().zip(&self.goal_parts);
+            ends.map(|(from, to)| interpolate(from, to, share)).collect()
+        };
+        let motion: Vec<Vec<Pose>> = (0..=RESERVE_WAYPOINTS).map(|i| between(i as f64 / RESERVE_WAYPOINTS as f64)).collect();
         let mut grasps = Vec::new();
         for part in next..self.part_count() {
             let fingers = self.scene.hold_fingers[part].map(|point| world_from_parts[part] * point);
             let (arm, place) = (arms[part], PartId(part as u16));
-            let reached = reachable_grasps(&self.simulation, &self.config.grasp, (arm, place), (&[], &fingers), &motion, stream);
+            // Cheaper than the later search itself: few postures of each gripper pose.
+            let config = GraspConfig {
+                approaches: self.config.grasp.approaches / 2,
+                ik_candidates: 1,
+                ik_restarts: 1,
+                ..self.config.grasp.clone()
+            };
+            let reached = reachable_grasps(&self.simulation, &config, (arm, place), (&[], &fingers), &motion, stream);
             let reached = reached.unwrap_or_default();
-            grasps.push(free_alone(&self.simulation, &self.config.grasp, &self.holders(), &world_from_parts, reached));
+            grasps.push(free_alone(&self.simulation, &config, &self.holders(), &world_from_parts, reached));
         }
         Reserve { world_from_parts, grasps }
     }
@@ -379,7 +395,7 @@ impl<'a> Attempt<'a> {
     }
 
     /// The object's trajectory to `goal` and the joint positions of each holding arm along it, free of collision.
-    fn plan_carry(&self, goal: &ObjectGoal) -> Result<(ObjectTrajectory, Vec<Vec<Vec<f64>>>), Failure> {
+    fn plan_carry(&self, goal: &ObjectGoal) -> Result<(ObjectTrajectory, Postures), Failure> {
         let trajectory = self.trajectory(goal.clone());
         let waypoints = self.waypoints(&trajectory);
         let mut postures = Vec::new();
@@ -389,7 +405,7 @@ impl<'a> Attempt<'a> {
             let part_from_tool = waypoints[0][part].inverse() * self.simulation.tool_pose(index);
             let poses: Vec<Pose> = waypoints[1..].iter().map(|parts| base_from_world * parts[part] * part_from_tool).collect();
             let now = self.simulation.joint_positions(index).as_slice().to_vec();
-            let way = track(&self.simulation.chains[index], &poses, &now, MAX_JOINT_STEP, &ik_settings(0)).map_err(|_| {
+            let way = track(&self.simulation.chains[index], &poses, &now, MAX_JOINT_STEP, &ik_settings(0)).map_err(|_where| {
                 Failure::new(FailureStage::Unreachable, format!("arm {index} cannot follow the object to its goal"))
             })?;
             postures.push(std::iter::once(now).chain(way).collect::<Vec<_>>());

@@ -4,7 +4,8 @@ use crate::failure::Failure;
 use crate::grasping::{Grasp, GraspConfig};
 use crate::planning_world::{Obstacles, collision_world, collision_world_at, with_one_arm};
 use crate::simulation::Simulation;
-use vmao_core::collision::{CollisionChecker, CollisionWorld};
+use std::collections::BTreeSet;
+use vmao_core::collision::{Collider, CollisionChecker, CollisionWorld};
 use vmao_core::geometry::Pose;
 use vmao_core::outcome::FailureStage;
 
@@ -77,9 +78,16 @@ pub(crate) fn compatible_grasps(
     let later = later_worlds(simulation, &openings, &touching, reserve);
     let mut room = later.each_ref().map(CollisionChecker::new);
     let mut blocked = None;
+    // Hands that meet do so whatever the arms' elbows do.
+    let mut hands_meet = BTreeSet::new();
+    let last_link = |arm: usize| simulation.chains[arm].len();
     let mut choices = Choices { roomy: Vec::new(), crowded: Vec::new() };
     for combination in cheapest_combinations(candidates, config.shortlist) {
         let chosen: Vec<&Grasp> = combination.iter().zip(candidates).map(|(&index, grasps)| &grasps[index]).collect();
+        let poses: Vec<usize> = chosen.iter().map(|grasp| grasp.pose).collect();
+        if hands_meet.contains(&poses) {
+            continue;
+        }
         let with = |phase: &dyn Fn(&Grasp) -> Vec<f64>| joint_positions_with(simulation, &chosen, phase);
         let at_standoff = standoff.check(&with(&|grasp| grasp.standoff().to_vec()), config.plan_margin);
         let mut at_grasp = || grasp.check(&with(&|grasp| grasp.grasp().to_vec()), config.table_clearance / 2.0);
@@ -90,6 +98,9 @@ pub(crate) fn compatible_grasps(
             .or_else(|| at_grasp().map(|pair| ("at the grasp", pair)))
             .or_else(|| carried().map(|pair| ("on the way to the goal", pair)));
         if let Some((when, pair)) = hit {
+            if is_hand(pair.first, last_link) && is_hand(pair.second, last_link) {
+                hands_meet.insert(poses);
+            }
             blocked.get_or_insert_with(|| format!("{when} {pair}"));
             continue;
         }
@@ -140,6 +151,10 @@ fn leaves_room_for(
         checker.check(&q, margin).is_none()
     };
     free(standoff, later.standoff(), config.plan_margin) && free(grasp, later.grasp(), config.table_clearance / 2.0)
+}
+
+fn is_hand(collider: Collider, last_link: impl Fn(usize) -> usize) -> bool {
+    matches!(collider, Collider::Link { arm, link } if link == last_link(arm))
 }
 
 fn openings(simulation: &Simulation<'_>) -> Vec<f64> {

@@ -39,6 +39,9 @@ const WATCH_EVERY: u64 = 10;
 /// A held part may be without pad contact for this many examinations before it counts as lost.
 const LOST_AFTER: u32 = 5;
 
+/// Ticks over which the pads' forces are averaged to tell whether a gripper holds its part.
+const HOLD_TICKS: u32 = 25;
+
 impl Simulation<'_> {
     /// Lets time pass with all goals as they are.
     pub(crate) fn wait(&mut self, seconds: f64) {
@@ -90,19 +93,17 @@ impl Simulation<'_> {
             self.grips[arm] = Grip::Close(config.closing_share);
         }
         self.wait(config.closing_seconds);
-        for grasp in grasps {
-            self.check_hold(grasp.arm, grasp.part, config)?;
+        // Contacts of stiff bodies come and go from one tick to the next: what counts is the mean over a moment.
+        let mut pads = vec![[0.0; 2]; grasps.len()];
+        for _ in 0..HOLD_TICKS {
+            self.tick();
+            for (pads, grasp) in pads.iter_mut().zip(grasps) {
+                let touch = self.touch(grasp.arm, grasp.part);
+                pads[0] += touch.pads[0] / f64::from(HOLD_TICKS);
+                pads[1] += touch.pads[1] / f64::from(HOLD_TICKS);
+            }
         }
-        Ok(())
-    }
-
-    fn check_hold(&self, arm: ArmId, part: PartId, config: &GraspConfig) -> Result<(), Failure> {
-        let pads = self.touch(arm, part).pads;
-        if pads.iter().all(|&force| force >= config.hold_force) {
-            return Ok(());
-        }
-        let why = format!("pads of arm {} press on part {} with {:.1} N and {:.1} N", arm.0, part.0, pads[0], pads[1]);
-        Err(Failure::new(FailureStage::NoContact, why))
+        grasps.iter().zip(pads).try_for_each(|(grasp, pads)| check_hold(grasp, pads, config))
     }
 
     /// Carries the object along `trajectory` with the arms that hold it; `postures` are their planned joint positions.
@@ -165,6 +166,15 @@ impl Simulation<'_> {
         }
         Ok(())
     }
+}
+
+fn check_hold(grasp: &Grasp, pads: [f64; 2], config: &GraspConfig) -> Result<(), Failure> {
+    if pads.iter().all(|&force| force >= config.hold_force) {
+        return Ok(());
+    }
+    let (arm, part) = (grasp.arm.0, grasp.part.0);
+    let why = format!("pads of arm {arm} press on part {part} with {:.1} N and {:.1} N", pads[0], pads[1]);
+    Err(Failure::new(FailureStage::NoContact, why))
 }
 
 /// Twist of a tool that rides on a body which moves from `before` to `after` within `dt` (s); linear, then angular.

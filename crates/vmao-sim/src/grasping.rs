@@ -59,6 +59,8 @@ pub struct GraspConfig {
 pub(crate) struct Grasp {
     pub(crate) arm: ArmId,
     pub(crate) part: PartId,
+    /// Which of the gripper poses on its contacts this is.
+    pub(crate) pose: usize,
     pub(crate) world_from_tool: Pose,
     /// Gap to open the pads to before the approach (m).
     pub(crate) opening: f64,
@@ -120,7 +122,7 @@ pub(crate) fn reachable_grasps(
     }
     let mut above_table = 0;
     let mut found = Vec::new();
-    for pose in poses {
+    for (index, pose) in poses.into_iter().enumerate() {
         let lowest = lowest_gripper_point(robot, &pose.world_from_tool, opening);
         let missing = config.table_clearance - lowest;
         let rise = -(pose.world_from_tool.rotation * Vector3::z()).z;
@@ -131,15 +133,9 @@ pub(crate) fn reachable_grasps(
         }
         above_table += 1;
         let world_from_tool = pose.backed_off(retreat);
-        found.extend(carried_grasps(
-            simulation,
-            config,
-            (arm, part),
-            &GripperPose { world_from_tool, ..pose },
-            opening,
-            motion,
-            stream,
-        ));
+        let ways =
+            carried_grasps(simulation, config, (arm, part), &GripperPose { world_from_tool, ..pose }, opening, motion, stream);
+        found.extend(ways.into_iter().map(|grasp| Grasp { pose: index, ..grasp }));
     }
     if found.is_empty() {
         let why = format!("arm {} reaches none of {above_table} gripper poses on part {} and its goal", arm.0, part.0);
@@ -197,7 +193,7 @@ fn carried_grasps(
         let carried = track(chain, &carried, approach.last()?, MAX_JOINT_STEP, &settings).ok()?;
         let posture = posture_cost(chain, &approach[0], now.as_slice()) + posture_cost(chain, carried.last()?, home);
         let cost = config.approach_cost * deviation + posture;
-        Some(Grasp { arm, part, world_from_tool: pose.world_from_tool, opening, approach, carried, cost })
+        Some(Grasp { arm, part, pose: 0, world_from_tool: pose.world_from_tool, opening, approach, carried, cost })
     };
     starts.into_iter().filter_map(reach).take(BRANCHES).collect()
 }

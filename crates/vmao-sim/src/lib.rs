@@ -1,5 +1,9 @@
 //! Physics: scenes, cameras, control and the one trial loop, on MuJoCo. Knows nothing of tensors.
 
+// The tests inside and outside this crate share one support module, which names the crate as from outside.
+#[cfg(test)]
+extern crate self as vmao_sim;
+
 mod assignment;
 mod attempt;
 mod cameras;
@@ -16,6 +20,8 @@ mod recorder;
 mod scene;
 mod simulation;
 mod task;
+#[cfg(test)]
+mod tests;
 mod trial;
 
 pub use cameras::CameraConfig;

@@ -99,11 +99,8 @@ impl<'s> Simulation<'s> {
             recorder.observe(self);
             self.recorder = Some(recorder);
         }
-    }
-
-    /// Simulated time (s).
-    pub(crate) fn time(&self) -> f64 {
-        self.steps as f64 * self.scene.timestep
+        #[cfg(test)]
+        crate::tests::after_tick(self);
     }
 
     fn grip_force(&self, arm: usize) -> f64 {

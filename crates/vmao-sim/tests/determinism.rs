@@ -72,8 +72,13 @@ fn recording_only_watches() {
         assert!(!rollout.frames.is_empty() && rollout.frames.iter().all(|frame| frame.len() == rollout.bodies.len()));
         let parts = rollout.bodies.iter().filter(|body| matches!(body.label, PointLabel::Part(_))).count();
         assert_eq!((parts, rollout.goal.len()), (2, 2));
-        assert!(rollout.frames.len() as f64 * rollout.frame_seconds <= on.record.steps as f64 * scene.timestep + 1e-9);
+        assert_eq!(rollout.frames[0][rollout.bodies.len() - 2..], on.record.start.world_from_parts, "begins with the start");
+        let length = rollout.frames.len() as f64 * rollout.frame_seconds;
+        assert!(length <= on.record.steps as f64 * scene.timestep);
         assert!(rollout.events.is_sorted_by(|a, b| a.time <= b.time));
+        // Nothing moves before the first grasp is asked for: it is the first thing that happens.
+        assert_eq!(rollout.contacts[0].0, 0.0, "times count from the first frame");
+        assert!(rollout.events.iter().all(|event| (0.0..=length).contains(&event.time)), "{:?} of {length}", rollout.events);
         assert!(rollout.frames.iter().flatten().all(|pose| pose.translation.vector.iter().all(|x| x.is_finite())));
     }
 }

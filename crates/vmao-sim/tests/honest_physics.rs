@@ -1,31 +1,50 @@
 //! Grasps hold by closing force and friction alone: without either, the trial that succeeds fails.
+#![expect(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
 mod support;
 
 use mujoco_rs::wrappers::mj_data::MjData;
 use mujoco_rs::wrappers::mj_model::{MjModel, MjtEq, MjtJoint, MjtObjBase, MjtTrn};
-use support::{configuration, demonstrated_trial, failed_at, first_success, scene, scene_with, slippery};
+use support::{configuration, demonstrated_trial, failed_at, first_successes, scene, scene_with, slippery};
 use vmao_core::order::GraspOrder;
 use vmao_core::outcome::FailureStage;
 use vmao_core::robots::panda;
 
+/// Friction at which the grasps must fail.
+const ICE: f64 = 0.05;
+
 fn check_that_grasping_matters(order: GraspOrder) {
     let (physics, config) = configuration();
     let scene = scene_with(&physics, 0);
-    let success = first_success(&scene, &config, order);
-    let index = success.record.index;
-    assert!(success.threshold_factor <= 1.0 && success.record.detail.is_empty());
+    let icy = scene_with(&slippery(&physics, ICE), 0);
+    let mut never_closed = config.clone();
+    never_closed.grasp.closing_share = 0.0;
+    for success in first_successes(&scene, &config, order, 3) {
+        let index = success.record.index;
+        assert!(success.threshold_factor <= 1.0 && success.record.detail.is_empty());
 
-    let ice = demonstrated_trial(&scene_with(&slippery(&physics, 0.05), 0), &config, order, index);
-    let lost = [FailureStage::Slip, FailureStage::NoContact, FailureStage::Threshold];
-    assert!(lost.contains(&failed_at(&ice)), "trial {index} on ice: {:?} {}", ice.record.outcome, ice.record.detail);
+        let ice = demonstrated_trial(&icy, &config, order, index);
+        let lost = [FailureStage::Slip, FailureStage::NoContact, FailureStage::Threshold];
+        assert!(lost.contains(&failed_at(&ice)), "trial {index} on ice: {:?} {}", ice.record.outcome, ice.record.detail);
 
-    let mut open = config.clone();
-    open.grasp.closing_share = 0.0;
-    let open = demonstrated_trial(&scene, &open, order, index);
-    assert_eq!(failed_at(&open), FailureStage::NoContact, "{}", open.record.detail);
-    assert_eq!(open.record.goal, success.record.goal, "the same trial");
-    assert!(open.record.grasps[0].world_from_gripper.is_some(), "the open gripper went to its grasp");
+        let open = demonstrated_trial(&scene, &never_closed, order, index);
+        assert_eq!(failed_at(&open), FailureStage::NoContact, "trial {index}: {}", open.record.detail);
+        assert_eq!(open.record.goal, success.record.goal, "the same trial");
+        assert!(open.record.grasps[0].world_from_gripper.is_some(), "the open gripper went to its grasp");
+    }
+}
+
+#[test]
+fn the_closing_force_carries_the_object_by_friction_but_not_on_ice() {
+    let (physics, config) = configuration();
+    let force = config.grasp.closing_share * panda().gripper.max_force;
+    for instance in 0..6 {
+        let weight = 9.81 * scene(instance).object.parts.iter().map(|part| part.mass).sum::<f64>();
+        // Coulomb: two grippers, two pads each.
+        let carried = |friction: f64| 4.0 * friction * force;
+        assert!(carried(ICE) < weight, "four pads with {force} N carry {weight} N on ice: the icy trials show nothing");
+        assert!(carried(physics.pad_friction.sliding) > 2.0 * weight);
+    }
 }
 
 #[test]

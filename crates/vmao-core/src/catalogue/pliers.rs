@@ -15,7 +15,9 @@ use nalgebra::{Point3, Translation3, UnitQuaternion, Vector3};
 use std::f64::consts::PI;
 
 /// Spread of the handles at joint position zero, and how far they open further (rad).
-const SMALLEST_SPREAD: f64 = 60.0 * PI / 180.0;
+///
+/// Wide, because two Panda hands, each 20 cm across, hold the two handles at the same time.
+const SMALLEST_SPREAD: f64 = 80.0 * PI / 180.0;
 const OPENING: f64 = 60.0 * PI / 180.0;
 /// Jaws stand this far off the +x axis at joint position zero (rad).
 const JAW_ANGLE: f64 = 6.0 * PI / 180.0;
@@ -42,7 +44,7 @@ fn size(set: InstanceSet, instance: u16) -> Size {
         [[0.75, 0.20, 0.45], [0.25, 0.50, 0.20]],
     ];
     Size {
-        handle_length: stream.range(0.120, 0.150),
+        handle_length: stream.range(0.135, 0.165),
         handle_width: stream.range(0.014, 0.020),
         jaw_length: stream.range(0.050, 0.070),
         thickness: stream.range(0.018, 0.024),
@@ -72,7 +74,7 @@ pub(super) fn item(set: InstanceSet, instance: u16) -> CatalogueItem {
         }],
     };
     let demonstrations =
-        [(0.50, 0.85), (0.85, 0.50), (0.65, 0.75), (0.85, 0.85), (0.55, 0.60), (0.75, 0.65), (0.90, 0.70), (0.70, 0.90)]
+        [(0.60, 0.85), (0.85, 0.60), (0.65, 0.75), (0.85, 0.85), (0.70, 0.70), (0.75, 0.65), (0.90, 0.70), (0.70, 0.90)]
             .into_iter()
             .map(|(a, b)| vec![hold(&size, 0, a), hold(&size, 1, b)])
             .collect();
