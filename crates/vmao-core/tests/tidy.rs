@@ -15,7 +15,7 @@ struct File {
 
 type Rule = fn(&[File]) -> Vec<String>;
 
-/// Folders that hold nothing of ours.
+/// Folders that hold nothing of ours; `.git` is a file in a linked working tree.
 const NOT_OURS: [&str; 7] = [".git", "target", "third_party", "runs", "node_modules", "__pycache__", ".venv"];
 /// Built by `viewer/build.sh` from `viewer/src`.
 const GENERATED: [&str; 1] = ["crates/vmao/src/report/viewer.js"];
@@ -29,7 +29,10 @@ fn workspace() -> Vec<File> {
         paths.sort();
         for path in paths {
             let name = path.file_name().unwrap_or_default().to_string_lossy();
-            if path.is_dir() && !NOT_OURS.contains(&&*name) {
+            if NOT_OURS.contains(&&*name) {
+                continue;
+            }
+            if path.is_dir() {
                 walk(root, &path, files);
             } else if path.is_file() {
                 let relative = path.strip_prefix(root).unwrap_or(&path).to_string_lossy().into_owned();
