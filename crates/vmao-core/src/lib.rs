@@ -29,3 +29,8 @@ pub mod robots;
 pub mod rollout;
 pub mod shape;
 pub mod time_parameterization;
+
+/// The code in the README, compiled and run with the documentation tests.
+#[cfg(doctest)]
+#[doc = include_str!("../../../README.md")]
+pub struct Readme;
