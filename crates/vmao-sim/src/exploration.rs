@@ -58,23 +58,32 @@ impl LabelSet {
     }
 }
 
+/// How new tuples are drawn and tried.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Proposals {
+    /// Algorithm 1's neighbourhood radius r (m).
+    pub radius: f64,
+    /// Grasp orders, taken in turn by the trials; not empty.
+    pub orders: Vec<GraspOrder>,
+}
+
 /// Runs the trials `indices` with the label set frozen, in the current rayon pool; results in index order.
 ///
-/// Trial i draws its scene, its tuple and all else from (`seed`, i). Orders alternate over the trials.
+/// Trial i draws its scene, its tuple and all else from (`seed`, i).
 pub fn explore_round(
     scenes: &[Scene],
     config: &TrialConfig,
     labels: &LabelSet,
-    radius: f64,
-    orders: &[GraspOrder],
-    seed: u64,
-    indices: Range<u64>,
+    proposals: &Proposals,
+    (seed, indices): (u64, Range<u64>),
     done: &(dyn Fn(&Trial) + Sync),
 ) -> Vec<Trial> {
     let run = |index: u64| {
         let scene = scene_of_trial(seed, index, scenes.len());
         let tuple = labels.draw(scene, &mut Stream::new(seed, &[index, TUPLE]));
+        let Proposals { radius, orders } = proposals;
         let order = orders[(index % orders.len() as u64) as usize];
+        let radius = *radius;
         let trial = run_trial(&scenes[scene], config, &JitteredTuple { tuple, radius }, order, (seed, index), Recording::Off);
         done(&trial);
         trial

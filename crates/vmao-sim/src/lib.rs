@@ -27,7 +27,7 @@ mod trial;
 pub use cameras::CameraConfig;
 pub use error::Error;
 pub use execution::MotionConfig;
-pub use exploration::{LabelSet, explore_round, scene_of_trial};
+pub use exploration::{LabelSet, Proposals, explore_round, scene_of_trial};
 pub use grasping::GraspConfig;
 pub use scene::{Friction, Layout, Scene, SceneConfig};
 pub use task::{GoalConfig, StartConfig, Thresholds};

@@ -12,7 +12,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use vmao_core::catalogue::InstanceSet;
 use vmao_core::outcome::{FailureStage, TrialOutcome};
 use vmao_core::record::TrialRecord;
-use vmao_sim::{LabelSet, explore_round, scene_of_trial};
+use vmao_sim::{LabelSet, Proposals, explore_round, scene_of_trial};
 
 /// What an exploration came to; the JSON answer of `explore`.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -33,7 +33,8 @@ pub struct Explored {
 pub fn explore(config: &Config, seed: u64, directory: &Path) -> Result<(Explored, Vec<TrialRecord>), Failure> {
     let scenes = scenes(config, InstanceSet::Train)?;
     let writer = DatasetWriter::open(directory)?;
-    let (trial_config, orders, settings) = (config.trial_config(), config.explored_orders(), &config.explore);
+    let (trial_config, settings) = (config.trial_config(), &config.explore);
+    let proposals = Proposals { radius: settings.radius, orders: config.explored_orders() };
     let mut labels = LabelSet::demonstrated(&scenes);
     let mut records: Vec<TrialRecord> = Vec::new();
     for shard in writer.shards()? {
@@ -55,7 +56,7 @@ pub fn explore(config: &Config, seed: u64, directory: &Path) -> Result<(Explored
             }
             bar.set_prefix(format!("{tried} trials, {:.0} % accepted", 100.0 * bar.position() as f64 / tried as f64));
         };
-        let trials = explore_round(&scenes, &trial_config, &labels, settings.radius, &orders, seed, first..last, &done);
+        let trials = explore_round(&scenes, &trial_config, &labels, &proposals, (seed, first..last), &done);
         let round: Vec<TrialRecord> = trials.into_iter().map(|trial| crate::dataset::stored(trial.record)).collect();
         writer.write_round(&round)?;
         round.iter().for_each(|record| labels.learn(scene_of_trial(seed, record.index, scenes.len()), record));

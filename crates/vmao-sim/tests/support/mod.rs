@@ -11,93 +11,31 @@ use vmao_core::outcome::{FailureStage, TrialOutcome};
 use vmao_core::random::Stream;
 use vmao_core::robots::panda;
 use vmao_sim::{
-    CameraConfig, Friction, GoalConfig, GraspConfig, Layout, MotionConfig, Recording, Scene, SceneConfig, StartConfig,
-    Thresholds, Trial, TrialConfig, run_trial,
+    CameraConfig, GoalConfig, GraspConfig, MotionConfig, Recording, Scene, SceneConfig, StartConfig, Thresholds, Trial,
+    TrialConfig, run_trial,
 };
 
 /// Seed of all trials of these tests.
 pub(crate) const SEED: u64 = 1;
 
-/// The scene's and the trials' configuration.
+/// The sections of the shipped configuration that a trial needs.
+#[derive(serde::Deserialize)]
+struct Shipped {
+    scene: SceneConfig,
+    start: StartConfig,
+    goal: GoalConfig,
+    thresholds: Thresholds,
+    cameras: CameraConfig,
+    grasp: GraspConfig,
+    motion: MotionConfig,
+    osc: OscGains,
+}
+
+/// The scene's and the trials' configuration: the shipped one.
 pub(crate) fn configuration() -> (SceneConfig, TrialConfig) {
-    let friction = |sliding| Friction { sliding, torsional: 0.003, rolling: 0.0001 };
-    let scene = SceneConfig {
-        layout: Layout::Opposed,
-        base_distance: 0.58,
-        base_spacing: 0.7,
-        timestep: 0.002,
-        friction_impedance_ratio: 100.0,
-        noslip_iterations: 3,
-        pad_friction: friction(1.0),
-        object_friction: friction(0.5),
-        table_friction: friction(0.5),
-        link_friction: friction(0.3),
-    };
-    let trial = TrialConfig {
-        start: StartConfig { half_width: 0.06 },
-        goal: GoalConfig {
-            lift: [0.08, 0.20],
-            sideways: 0.15,
-            yaw_deg: 45.0,
-            tilt_deg: 15.0,
-            joint_change_share: 0.25,
-            joint_change_deg: 15.0,
-        },
-        thresholds: Thresholds { position: 0.02, rotation_deg: 10.0, joint_deg: 5.0, joint_m: 0.01, hold_seconds: 0.5 },
-        cameras: CameraConfig {
-            count: 4,
-            width: 240,
-            height: 180,
-            field_of_view_deg: 40.0,
-            distance: 0.7,
-            elevations: vec![0.6, 0.08],
-            workspace_half_width: 0.25,
-            workspace_height: 0.5,
-            points: 1024,
-            table_share: 0.15,
-            robot_share: 0.15,
-        },
-        grasp: GraspConfig {
-            approaches: 24,
-            standoff: 0.08,
-            opening_margin: 0.02,
-            table_clearance: 0.004,
-            max_retreat: 0.009,
-            plan_margin: 0.005,
-            lean_forward: 0.4,
-            lean_inward: 0.4,
-            carry_margin: 0.012,
-            approach_cost: 1.0,
-            squaring_deg: 50.0,
-            shortlist: 80,
-            ik_candidates: 5,
-            ik_restarts: 6,
-            // 7 N a pad: four pads carry the lightest pliers only above a friction of 0.06, so that ice must drop them.
-            closing_share: 0.2,
-            closing_seconds: 0.5,
-            hold_force: 5.0,
-        },
-        motion: MotionConfig {
-            velocity_share: 0.5,
-            acceleration_share: 0.3,
-            approach_share: 0.4,
-            object_speed: 0.12,
-            object_turning_speed: 0.6,
-            shortest_motion: 1.0,
-            collision_force: 15.0,
-            waypoints: 12,
-        },
-        osc: OscGains {
-            position_stiffness: 400.0,
-            rotation_stiffness: 400.0,
-            damping_ratio: 1.0,
-            posture_stiffness: 100.0,
-            singularity_damping: 1e-3,
-            max_position_error: 0.05,
-            max_rotation_error: 0.3,
-        },
-    };
-    (scene, trial)
+    let Shipped { scene, start, goal, thresholds, cameras, grasp, motion, osc } =
+        toml::from_str(include_str!("../../../../configs/demo.toml")).unwrap();
+    (scene, TrialConfig { start, goal, thresholds, cameras, grasp, motion, osc })
 }
 
 /// Two Pandas and the pliers in their `instance`-th training size.
