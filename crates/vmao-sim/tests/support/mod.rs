@@ -11,7 +11,7 @@ use vmao_core::outcome::{FailureStage, TrialOutcome};
 use vmao_core::random::Stream;
 use vmao_core::robots::panda;
 use vmao_sim::{
-    CameraConfig, GoalConfig, GraspConfig, MotionConfig, Recording, Scene, SceneConfig, StartConfig, Thresholds, Trial,
+    CameraConfig, Friction, GoalConfig, GraspConfig, MotionConfig, Recording, Scene, SceneConfig, StartConfig, Thresholds, Trial,
     TrialConfig, run_trial,
 };
 
