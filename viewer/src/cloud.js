@@ -100,10 +100,14 @@ function ball(color, radius, position) {
   const rim = new Mesh(shape, new MeshBasicMaterial({ color: 0xffffff, side: BackSide }));
   core.scale.setScalar(radius);
   rim.scale.setScalar(radius * 1.35);
-  const through = new Mesh(shape, new MeshBasicMaterial({ color: new Color(color), transparent: true, opacity: 0.4, depthTest: false }));
-  through.scale.setScalar(radius);
-  through.renderOrder = 5;
-  group.add(core, rim, through);
+  group.add(core, rim);
+  // The mark shows, fainter, through the points that surround it.
+  for (const [ink, scale, opacity, order] of [[0xffffff, 1.3, 0.55, 5], [color, 1, 0.8, 6]]) {
+    const through = new Mesh(shape, new MeshBasicMaterial({ color: new Color(ink), transparent: true, opacity, depthTest: false, depthWrite: false }));
+    through.scale.setScalar(scale * radius);
+    through.renderOrder = order;
+    group.add(through);
+  }
   group.position.copy(position);
   return group;
 }

@@ -115,16 +115,19 @@ function timeline(events, duration, seek) {
     el("span", { class: "when" }, time.toFixed(1)), el("span", {}, label))));
   const list = ordered.length ? el("ol", { class: "events", "aria-label": "Stages; each button jumps there" }, items) : null;
   let current = -1;
+  // Arms that move in parallel begin stages at one time.
+  const together = (i, now) => now >= 0 && i <= now && ordered[now].time - ordered[i].time < 1e-6;
   const mark = (time) => {
     const now = ordered.findLastIndex((event) => event.time <= time + 1e-6);
     if (now !== current) {
-      items[current]?.classList.remove("now");
-      items[now]?.classList.add("now");
-      items.forEach((item, i) => item.classList.toggle("past", i < now));
+      items.forEach((item, i) => {
+        item.classList.toggle("now", together(i, now));
+        item.classList.toggle("past", i < now && !together(i, now));
+      });
       current = now;
       if (list && items[now]) list.scrollTop = items[now].offsetTop - list.offsetTop - list.clientHeight / 2 + items[now].offsetHeight;
     }
-    return ordered[now]?.label ?? "";
+    return ordered.filter((_, i) => together(i, now)).map(({ label }) => label).join(" · ");
   };
   return { ticks, list, mark };
 }

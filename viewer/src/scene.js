@@ -120,7 +120,7 @@ export class RolloutScene {
     key.shadow.needsUpdate = true;
     this.shadow = key.shadow;
     key.shadow.bias = -0.0008;
-    key.shadow.normalBias = 0.012;
+    key.shadow.normalBias = 0.004;
     Object.assign(key.shadow.camera, { left: -1.3 * radius, right: 1.3 * radius, top: 1.3 * radius, bottom: -1.3 * radius, near: 0.1 * radius, far: 6 * radius });
     const fill = new DirectionalLight(0xdfe9ff, 0.6);
     fill.position.copy(target).add(new Vector3(-1, 0.8, 0.7));
