@@ -23,9 +23,11 @@ function extent(values) {
 
 /**
  * A responsive chart of `series`: [{name, color, dash?, points: [[x, y], …]}]; gaps where y is null.
- * `mark` draws a vertical line at an x; `whole` keeps the horizontal ticks at whole numbers.
+ * `mark` draws a vertical line at an x; `whole` keeps the horizontal ticks at whole numbers;
+ * `log` makes the vertical axis logarithmic and leaves gaps at values that have no logarithm.
  */
-export function lineChart(options) {
+export function lineChart(given) {
+  const options = given.log ? { ...given, series: given.series.map((s) => ({ ...s, points: s.points.map(([x, y]) => [x, isNumber(y) && y > 0 ? y : null]) })) } : given;
   const holder = el("div", { class: "chart" });
   const readout = el("div", { class: "readout", hidden: true });
   const draw = () => {
@@ -47,26 +49,47 @@ function key(series) {
       svg("line", { x1: 1, x2: 25, y1: 5, y2: 5, stroke: color, "stroke-width": 2.5, "stroke-dasharray": dash || null })), name)));
 }
 
-function frameOf({ series, width, height = 240, yRange, xRange, whole }) {
+/** Round powers of ten that cover [low, high], at most about six. */
+function decades(low, high) {
+  const [first, last] = [Math.floor(Math.log10(low)), Math.ceil(Math.log10(high))];
+  const step = Math.max(1, Math.ceil((last - first) / 5));
+  const out = [];
+  for (let power = first; power <= last; power += step) out.push(10 ** power);
+  return out;
+}
+
+function frameOf({ series, width, height = 240, yRange, xRange, whole, log }) {
   const xs = xRange ?? extent(series.flatMap((s) => s.points.map(([x]) => x))) ?? [0, 1];
   let ys = yRange ?? extent(series.flatMap((s) => s.points.map(([, y]) => y))) ?? [0, 1];
-  if (!yRange) {
+  if (log) {
+    ys = [10 ** Math.floor(Math.log10(ys[0] || 0.1)), 10 ** Math.ceil(Math.log10(ys[1]) + 1e-9)];
+    if (ys[0] === ys[1]) ys[1] *= 10;
+  } else if (!yRange) {
     // Losses are read against zero unless they stay far from it.
     const pad = 0.06 * (ys[1] - ys[0] || Math.abs(ys[1]) || 1);
     ys = [ys[0] >= 0 && ys[0] < 0.5 * ys[1] ? 0 : ys[0] - pad, ys[1] + pad];
   }
-  const yTicks = ticks(ys[0], ys[1], height < 200 ? 3 : 5);
-  const longest = Math.max(...yTicks.map((t) => reading(t).length), 1);
+  const yTicks = log ? decades(...ys) : ticks(ys[0], ys[1], height < 200 ? 3 : 5);
+  const scale = log ? Math.log10 : (value) => value;
+  const longest = Math.max(...yTicks.map((t) => tickText(t).length), 1);
   const box = { left: 30 + 6.6 * longest, right: width - 14, top: 12, bottom: height - 42 };
   const spanX = xs[1] - xs[0] || 1;
-  const spanY = ys[1] - ys[0] || 1;
+  const spanY = scale(ys[1]) - scale(ys[0]) || 1;
   const xTicks = ticks(xs[0], xs[1], Math.max(2, Math.round((box.right - box.left) / 90))).filter((t) => !whole || Number.isInteger(t));
   return {
     width, height, box, xTicks, yTicks,
     x: (value) => box.left + ((value - xs[0]) / spanX) * (box.right - box.left),
-    y: (value) => box.bottom - ((value - ys[0]) / spanY) * (box.bottom - box.top),
+    y: (value) => box.bottom - ((scale(value) - scale(ys[0])) / spanY) * (box.bottom - box.top),
   };
 }
+
+/** A tick's words: powers of ten short, the rest as read. */
+const tickText = (value) => (value > 0 && value < 1e-2 && Number.isInteger(Math.round(1e6 * Math.log10(value)) / 1e6)
+  ? `10${String(Math.round(Math.log10(value))).replace("-", "⁻").replace(/\d/g, (digit) => "⁰¹²³⁴⁵⁶⁷⁸⁹"[digit])}` : reading(value));
+
+/** Whether a later series lies on this one and would hide it. */
+const covered = (series, at) => series.slice(at + 1).some((later) => later.points.length === series[at].points.length && !later.dash === !series[at].dash &&
+  later.points.every(([x, y], i) => x === series[at].points[i][0] && y === series[at].points[i][1]));
 
 function path(points, frame) {
   let text = "";
@@ -85,7 +108,7 @@ function axes(frame, { xLabel, yLabel }) {
   return [
     frame.yTicks.map((t) => svg("g", { class: "tick" },
       svg("line", { x1: box.left, x2: box.right, y1: frame.y(t), y2: frame.y(t) }),
-      svg("text", { x: box.left - 8, y: frame.y(t) + 4, "text-anchor": "end" }, reading(t)))),
+      svg("text", { x: box.left - 8, y: frame.y(t) + 4, "text-anchor": "end" }, tickText(t)))),
     frame.xTicks.map((t) => svg("g", { class: "tick" },
       svg("line", { x1: frame.x(t), x2: frame.x(t), y1: box.bottom, y2: box.bottom + 5, class: "axis" }),
       svg("text", { x: frame.x(t), y: box.bottom + 19, "text-anchor": "middle" }, reading(t)))),
@@ -104,7 +127,7 @@ function chartOf(options, readout) {
     role: "img", tabindex: 0, "aria-label": `${name ?? options.yLabel}: ${series.map(summary).join("; ")}. Arrow keys read values.` },
     axes(frame, options),
     isNumber(mark) && svg("line", { class: "mark", x1: frame.x(mark), x2: frame.x(mark), y1: box.top, y2: box.bottom }),
-    series.map((s) => svg("path", { d: path(s.points, frame), fill: "none", stroke: s.color, "stroke-width": 2, "stroke-linejoin": "round",
+    series.map((s, i) => svg("path", { d: path(s.points, frame), fill: "none", stroke: s.color, "stroke-width": covered(series, i) ? 6 : 2, "stroke-linejoin": "round",
       "stroke-dasharray": s.dash || null })),
     series.filter((s) => s.dots || s.points.length === 1).map((s) => s.points.filter(([, y]) => isNumber(y)).map(([x, y]) =>
       svg("circle", { cx: frame.x(x), cy: frame.y(y), r: 3, fill: s.color }))),

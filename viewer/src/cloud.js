@@ -33,9 +33,10 @@ void main() {
   // A tinted point first loses its own colour, so that green on yellow does not turn to mud.
   vec3 plain = mix(tint, vec3(dot(tint, vec3(0.3, 0.59, 0.11))), 0.8 * min(1.0, 2.5 * strength));
   shade = mix(plain, hue, strength);
-  fade = quiet * smoothstep(0.55, 1.0, distance(position, middle) / reach);
+  float scenery = step(0.005, quiet);
+  fade = quiet * smoothstep(0.42, 0.85, distance(position, middle) / reach);
   gl_Position = projectionMatrix * seen;
-  gl_PointSize = max(1.5, size * (quiet > 0.995 ? 0.65 : 1.0) * (1.0 + 0.45 * strength) * height * projectionMatrix[1][1] * 0.5 / gl_Position.w);
+  gl_PointSize = max(1.5, size * mix(1.0 + 0.25 * strength, 0.5, scenery) * height * projectionMatrix[1][1] * 0.5 / gl_Position.w);
 }`;
 
 const FRAGMENT = `
@@ -100,12 +101,19 @@ function ball(color, radius, position) {
   core.scale.setScalar(radius);
   rim.scale.setScalar(radius * 1.35);
   group.add(core, rim);
+  // The mark shows, fainter, through the points that surround it.
+  for (const [ink, scale, opacity, order] of [[0xffffff, 1.3, 0.55, 5], [color, 1, 0.8, 6]]) {
+    const through = new Mesh(shape, new MeshBasicMaterial({ color: new Color(ink), transparent: true, opacity, depthTest: false, depthWrite: false }));
+    through.scale.setScalar(scale * radius);
+    through.renderOrder = order;
+    group.add(through);
+  }
   group.position.copy(position);
   return group;
 }
 
 /**
- * The base attributes that all maps of a figure share: positions, colours in [0, 1] quietened a little so that
+ * The base attributes that all maps of a figure share: positions, colours in [0, 1] quietened so that
  * the map reads over them, and which points may fade out.
  */
 export function cloudBase(points, colors, kinds) {
@@ -120,7 +128,9 @@ export function cloudBase(points, colors, kinds) {
       const value = points[3 * i + k];
       positions[3 * i + k] = Number.isFinite(value) ? value : 0;
       const base = (colors[3 * i + k] ?? 170) / 255;
-      tints[3 * i + k] = table ? 0.55 * base + 0.45 * 0.9 : 0.78 * base + 0.22 * 0.8;
+      const light = (0.3 * (colors[3 * i] ?? 170) + 0.59 * (colors[3 * i + 1] ?? 170) + 0.11 * (colors[3 * i + 2] ?? 170)) / 255;
+      // Part colours may be the fingers' own green and blue, so only a trace of them stays.
+      tints[3 * i + k] = kinds[i] === PART ? 0.26 * base + 0.74 * (0.66 + 0.2 * light) : table ? 0.55 * base + 0.45 * 0.9 : 0.3 * light + 0.7 * 0.88;
     }
   }
   return { count: n, positions: new BufferAttribute(positions, 3), tints: new BufferAttribute(tints, 3), quiet: new BufferAttribute(quiet, 1) };
@@ -140,14 +150,14 @@ export function mapScene(base, frame, first, second) {
   }
   const material = new ShaderMaterial({
     vertexShader: VERTEX, fragmentShader: FRAGMENT,
-    uniforms: { height: { value: 1 }, size: { value: 2.5 * frame.spacing }, middle: { value: frame.middle }, reach: { value: 2.6 * frame.radius } },
+    uniforms: { height: { value: 1 }, size: { value: 2.3 * frame.spacing }, middle: { value: frame.middle }, reach: { value: 2.6 * frame.radius } },
   });
   const cloud = new Points(geometry, material);
   cloud.frustumCulled = false;
   const scene = new Scene();
   scene.add(cloud);
   const balls = new Group();
-  peaks.forEach(({ point }, finger) => { if (point) balls.add(ball(FINGERS[finger], 0.034 * frame.radius, point)); });
+  peaks.forEach(({ point }, finger) => { if (point) balls.add(ball(FINGERS[finger], Math.max(0.034 * frame.radius, 1.45 * frame.spacing), point)); });
   scene.add(balls);
   return { scene, material, peaks, balls };
 }

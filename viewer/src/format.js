@@ -21,6 +21,12 @@ export function reading(value) {
   return String(Number(value.toPrecision(4))).replace("-", "−");
 }
 
+/** Words from the data as whole sentences with a space after them: a capital first, a full stop last. */
+export function sentences(text) {
+  const words = (text ?? "").trim().replace(/(^|[.!?]\s+)(\p{Ll})/gu, (_, before, letter) => before + letter.toUpperCase());
+  return words && `${words}${/[.!?…]$/.test(words) ? "" : "."} `;
+}
+
 /** Seconds with two digits. */
 export const seconds = (value) => `${value.toFixed(2)}\u2009s`;
 

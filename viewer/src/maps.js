@@ -3,7 +3,7 @@
 import { PerspectiveCamera } from "three";
 import { unpackBytes, unpackFloats } from "./data.js";
 import { el, figure, numberOf, svg } from "./dom.js";
-import { isNumber } from "./format.js";
+import { isNumber, sentences } from "./format.js";
 import { blend, cloudBase, cloudFrame, mapScene } from "./cloud.js";
 import { Orbit } from "./orbit.js";
 import { FINGERS } from "./palette.js";
@@ -17,9 +17,9 @@ export function mapsSection(figures, stage) {
   return figures.filter((entry) => entry.maps?.length).map((entry) => mapsFigure(entry, numberOf("Figure"), stage));
 }
 
-const caption = (entry) => `${entry.caption ? `${entry.caption} ` : ""}Contact maps of one scene for ${entry.maps.length} latent codes: finger 1 in green, ` +
+const caption = (entry) => `${sentences(entry.caption)}Contact maps of one scene for ${entry.maps.length} latent codes: finger 1 in green, ` +
   "finger 2 in blue, shaded by probability relative to each finger's maximum; a ball marks the most probable point. " +
-  "The cloud keeps its own colours where the probability is low. All views share one camera.";
+  "Where the probability is low the object keeps a pale shade of its own colour; table and arms are paler still. All views share one camera.";
 
 function mapsFigure(entry, name, stage) {
   const title = entry.title && el("h3", {}, entry.title);

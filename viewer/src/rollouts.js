@@ -2,12 +2,14 @@
 
 import { PerspectiveCamera } from "three";
 import { el, figure, numberOf } from "./dom.js";
-import { seconds } from "./format.js";
+import { fitView } from "./fit.js";
+import { seconds, sentences } from "./format.js";
 import { Orbit } from "./orbit.js";
 import { RolloutScene } from "./scene.js";
 import { NO_WEBGL } from "./stage.js";
 
 const FIELD = 28;
+const ASPECT = 16 / 10; // as the style sheet has it
 const SPEEDS = [0.25, 0.5, 1, 2, 4];
 
 /** The rollout section's content; nothing without frames. */
@@ -17,21 +19,22 @@ export function rolloutsSection(rollouts, stage) {
 
 function outcomeBadge(outcome) {
   const good = outcome === "success";
-  const words = good ? "Success" : outcome ? `Failed: ${outcome.replace(/^failed:?\s*/i, "")}` : "";
+  // The stage alone; what happened there is in the caption.
+  const words = good ? "Success" : outcome ? `Failed: ${outcome.replace(/^failed:?\s*/i, "").split(":")[0].replaceAll("-", " ")}` : "";
   return words && el("span", { class: `badge ${good ? "good" : "bad"}` }, words);
 }
 
 function player({ title, caption, rollout }, name, stage) {
   const head = el("div", { class: "player-head" }, el("h3", {}, title || "Rollout"), outcomeBadge(rollout.outcome));
-  const words = `${caption ? `${caption} ` : ""}The goal is the green ghost; small balls are the asked contact points, finger 1 green and finger 2 blue.`;
+  const words = `${sentences(caption)}The goal is the green ghost; small balls are the asked contact points, finger 1 green and finger 2 blue.`;
   if (!stage) return figure(name, words, head, el("p", { class: "notice" }, NO_WEBGL));
 
   const world = new RolloutScene(rollout);
   const { duration } = world.motion;
   const camera = new PerspectiveCamera(FIELD, 1, 0.01, 50);
-  const { target, radius, front, work } = world.frame;
-  const distance = (0.86 * radius) / Math.sin((FIELD * Math.PI) / 360);
-  const orbit = new Orbit({ target, distance, azimuth: front + 0.5, elevation: 0.5 });
+  const { points, front, work } = world.frame;
+  const from = (azimuth, elevation) => ({ azimuth, elevation, ...fitView(points, { azimuth, elevation, field: (FIELD * Math.PI) / 180, aspect: ASPECT }) });
+  const orbit = new Orbit(from(front + 0.42, 0.5));
   const canvas = el("canvas", { class: "view wide", "aria-label": `${title || "Rollout"}. Space plays and pauses. Arrow keys turn, plus and minus zoom, 0 resets.` });
   orbit.attach(canvas);
   const view = stage.add(canvas, () => {
@@ -78,7 +81,7 @@ function player({ title, caption, rollout }, name, stage) {
     });
   }
 
-  const fly = (azimuth, elevation) => orbit.fly({ azimuth, elevation, distance, target: target.clone() });
+  const fly = (azimuth, elevation) => orbit.fly(from(azimuth, elevation));
   const near = () => orbit.fly({ azimuth: front + 0.25, elevation: 0.24, distance: (1.5 * work.radius) / Math.sin((FIELD * Math.PI) / 360), target: work.middle.clone() });
   const camButton = (label, action) => el("button", { type: "button", onclick: action }, label);
   const cameras = el("div", { class: "cameras", role: "group", "aria-label": "Camera" },
@@ -112,16 +115,19 @@ function timeline(events, duration, seek) {
     el("span", { class: "when" }, time.toFixed(1)), el("span", {}, label))));
   const list = ordered.length ? el("ol", { class: "events", "aria-label": "Stages; each button jumps there" }, items) : null;
   let current = -1;
+  // Arms that move in parallel begin stages at one time.
+  const together = (i, now) => now >= 0 && i <= now && ordered[now].time - ordered[i].time < 1e-6;
   const mark = (time) => {
     const now = ordered.findLastIndex((event) => event.time <= time + 1e-6);
     if (now !== current) {
-      items[current]?.classList.remove("now");
-      items[now]?.classList.add("now");
-      items.forEach((item, i) => item.classList.toggle("past", i < now));
+      items.forEach((item, i) => {
+        item.classList.toggle("now", together(i, now));
+        item.classList.toggle("past", i < now && !together(i, now));
+      });
       current = now;
       if (list && items[now]) list.scrollTop = items[now].offsetTop - list.offsetTop - list.clientHeight / 2 + items[now].offsetHeight;
     }
-    return ordered[now]?.label ?? "";
+    return ordered.filter((_, i) => together(i, now)).map(({ label }) => label).join(" · ");
   };
   return { ticks, list, mark };
 }

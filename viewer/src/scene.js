@@ -2,7 +2,7 @@
 
 import {
   AmbientLight, Box3, Color, DirectionalLight, Group, HemisphereLight, LessEqualDepth, Matrix4, Mesh, MeshBasicMaterial,
-  MeshStandardMaterial, Object3D, Scene, SphereGeometry, Vector3,
+  MeshStandardMaterial, Object3D, PlaneGeometry, Scene, ShadowMaterial, SphereGeometry, Vector3,
 } from "three";
 import { unpackFloats } from "./data.js";
 import { Motion, readPose } from "./motion.js";
@@ -22,6 +22,7 @@ export class RolloutScene {
     this.place(0);
     this.frame = this.measure();
     this.light();
+    this.ground();
     this.contacts = this.makeContacts();
     this.place(0);
   }
@@ -68,6 +69,7 @@ export class RolloutScene {
   /** What the camera should see: where the parts go, and the arms' bases. */
   measure() {
     const box = new Box3();
+    const points = [];
     const bases = new Map();
     const probe = new Object3D();
     this.rollout.bodies.forEach(({ kind, index }, i) => {
@@ -78,9 +80,13 @@ export class RolloutScene {
       for (let k = 0; k <= steps; k++) {
         this.motion.place(i, (this.motion.duration * k) / steps, probe);
         box.expandByPoint(probe.position);
+        points.push([probe.position.clone(), kind === "part" ? 0.05 : 0.09]);
       }
     });
-    this.ghost.children.forEach((part) => box.expandByPoint(part.position));
+    this.ghost.children.forEach((part) => {
+      box.expandByPoint(part.position);
+      points.push([part.position.clone(), 0.05]);
+    });
     const work = new Box3();
     this.rollout.bodies.forEach(({ kind }, i) => {
       if (kind !== "part") return;
@@ -91,12 +97,13 @@ export class RolloutScene {
     });
     this.ghost.children.forEach((part) => work.expandByPoint(part.position));
     if (box.isEmpty()) box.set(new Vector3(-0.5, -0.5, 0), new Vector3(0.5, 0.5, 0.5));
+    if (!points.length) points.push([box.min.clone(), 0], [box.max.clone(), 0]);
     const size = box.getSize(new Vector3());
     if (work.isEmpty()) work.copy(box);
     const target = work.getCenter(new Vector3());
     target.z = 0.6 * target.z + 0.4 * (box.min.z + 0.5 * size.z);
     const near = { middle: work.getCenter(new Vector3()), radius: Math.max(0.14, 0.5 * work.getSize(new Vector3()).length()) };
-    return { target, radius: Math.max(0.15, 0.5 * size.length()), front: frontAzimuth([...bases.values()], target), work: near };
+    return { points, target, radius: Math.max(0.15, 0.5 * size.length()), front: frontAzimuth([...bases.values()], target), work: near };
   }
 
   light() {
@@ -109,14 +116,26 @@ export class RolloutScene {
     key.shadow.radius = 3;
     key.shadow.intensity = 0.48;
     key.shadow.autoUpdate = false;
+    // Without a first map the shadow sampler has nothing to read and the scene is not drawn at all.
+    key.shadow.needsUpdate = true;
     this.shadow = key.shadow;
     key.shadow.bias = -0.0008;
-    key.shadow.normalBias = 0.012;
+    key.shadow.normalBias = 0.004;
     Object.assign(key.shadow.camera, { left: -1.3 * radius, right: 1.3 * radius, top: 1.3 * radius, bottom: -1.3 * radius, near: 0.1 * radius, far: 6 * radius });
     const fill = new DirectionalLight(0xdfe9ff, 0.6);
     fill.position.copy(target).add(new Vector3(-1, 0.8, 0.7));
     fill.target.position.copy(target);
     this.scene.add(key, key.target, fill, fill.target, new HemisphereLight(0xffffff, 0xd9d4ca, 1.7), new AmbientLight(0xffffff, 0.35));
+  }
+
+  /** The table top at z = 0 where no body is the table: only the shadows on it, so that it hides nothing from below. */
+  ground() {
+    if (this.rollout.bodies.some(({ kind }) => kind === "table")) return;
+    const { target, radius } = this.frame;
+    const top = new Mesh(new PlaneGeometry(6 * radius, 6 * radius), new ShadowMaterial({ color: 0x2b2a26, opacity: 0.5 }));
+    top.position.set(target.x, target.y, 0);
+    top.receiveShadow = true;
+    this.scene.add(top);
   }
 
   /** Balls where fingers were asked to touch; each rides on the body it lies on. Shown from the stage before the grasp on. */
