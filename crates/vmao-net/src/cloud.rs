@@ -5,8 +5,8 @@ use crate::error::Error;
 use crate::kernels::cross_entropy::FINGERS;
 use crate::neighbours::squared_distance;
 
-/// Numbers per point that the scene encoder reads: centred position and colour.
-pub(crate) const FEATURES: usize = 6;
+/// Numbers per point that the scene encoder reads: centred position, colour, outward offset.
+pub(crate) const FEATURES: usize = 9;
 
 /// One successful grasp: what was seen before it, and where the two fingers touched.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -36,22 +36,67 @@ pub(crate) fn check_cloud(points: &[[f32; 3]], colors: &[[f32; 3]], fewest: usiz
     Ok(())
 }
 
-/// The cloud in the network's frame: xy from the geometric median of what stands on the table, z from the height origin (m).
+/// Where the network's frame lies in the world.
 ///
-/// The median stays with the many points of the object where a mean would follow the few of an arm. A cloud with nothing above the
-/// table is centred on its own median. The frame moves and turns with the cloud along the table and keeps heights.
-pub(crate) fn centre(points: &[[f32; 3]], config: &NetworkConfig) -> Vec<[f32; 3]> {
-    let mut standing: Vec<[f64; 2]> =
-        points.iter().filter(|p| p[2] > config.table_height).map(|p| [f64::from(p[0]), f64::from(p[1])]).collect();
-    if standing.is_empty() {
-        standing = points.iter().map(|p| [f64::from(p[0]), f64::from(p[1])]).collect();
-    }
-    let [x, y] = geometric_median(&standing).map(|x| x as f32);
-    points.iter().map(|p| [p[0] - x, p[1] - y, p[2] - config.height_origin]).collect()
+/// Its origin is the geometric median, in x and y, of what stands on the table (of everything, if nothing does), which stays with
+/// the many points of the object where a mean would follow the few of an arm. Its x axis is the direction in which the object
+/// sticks out: the third moment Σ w |r|² r of the points near the origin, weighted by their density, so that thinly seen arms and
+/// table count for little. The frame moves and turns with the object along the table and keeps heights.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Frame {
+    origin: [f32; 2],
+    cos: f32,
+    sin: f32,
 }
 
-/// The point with the least sum of distances to `points`: Weiszfeld's iteration from the mean, a fixed number of steps.
-fn geometric_median(points: &[[f64; 2]]) -> [f64; 2] {
+/// Reach of the points that turn the frame (m).
+const FRAME_REACH: f64 = 0.2;
+
+impl Frame {
+    /// Of a cloud whose points are `spacing` apart (m).
+    pub(crate) fn of(points: &[[f32; 3]], spacing: &[f32], config: &NetworkConfig) -> Self {
+        let pairs = points.iter().zip(spacing);
+        let mut standing: Vec<[f64; 3]> =
+            pairs.clone().filter(|(p, _)| p[2] > config.table_height).map(|(p, s)| weighted(p, *s)).collect();
+        if standing.is_empty() {
+            standing = pairs.map(|(p, s)| weighted(p, *s)).collect();
+        }
+        let origin = geometric_median(&standing);
+        standing.retain(|p| (p[0] - origin[0]).hypot(p[1] - origin[1]) < FRAME_REACH);
+        let total: f64 = standing.iter().map(|p| p[2]).sum();
+        let mean = [0, 1].map(|axis| standing.iter().map(|p| p[2] * p[axis]).sum::<f64>() / total);
+        let mut moment = [0.0; 2];
+        for p in &standing {
+            let r = [p[0] - mean[0], p[1] - mean[1]];
+            let weight = p[2] * (r[0] * r[0] + r[1] * r[1]);
+            (0..2).for_each(|axis| moment[axis] += weight * r[axis]);
+        }
+        let length = moment[0].hypot(moment[1]);
+        let [cos, sin] = if length > 0.0 { moment.map(|m| (m / length) as f32) } else { [1.0, 0.0] };
+        Self { origin: origin.map(|x| x as f32), cos, sin }
+    }
+
+    /// World points in this frame, z from the height origin (m).
+    pub(crate) fn place(&self, points: &[[f32; 3]], config: &NetworkConfig) -> Vec<[f32; 3]> {
+        let moved = points.iter().map(|p| [p[0] - self.origin[0], p[1] - self.origin[1], p[2] - config.height_origin]);
+        moved.map(|p| self.turn(p)).collect()
+    }
+
+    /// A world direction in this frame.
+    pub(crate) fn turn(&self, v: [f32; 3]) -> [f32; 3] {
+        [self.cos * v[0] + self.sin * v[1], self.cos * v[1] - self.sin * v[0], v[2]]
+    }
+}
+
+/// x, y and density of a point.
+fn weighted(point: &[f32; 3], spacing: f32) -> [f64; 3] {
+    /// Spacing below which points count as equally dense (m).
+    const SMALLEST: f64 = 1e-3;
+    [f64::from(point[0]), f64::from(point[1]), f64::from(spacing).max(SMALLEST).powi(-2)]
+}
+
+/// The point in the plane with the least sum of distances to `points` (x, y and a number not read here): Weiszfeld's iteration from the mean, a fixed number of steps.
+fn geometric_median(points: &[[f64; 3]]) -> [f64; 2] {
     const STEPS: usize = 30;
     /// Distances below this count as this much, so that a point hit exactly does not divide by zero (m).
     const NEAREST: f64 = 1e-3;
@@ -69,12 +114,28 @@ fn geometric_median(points: &[[f64; 2]]) -> [f64; 2] {
     median
 }
 
-/// Rows [x, y, z, r, g, b] of a centred cloud, positions in `position_unit`, colours about zero.
-pub(crate) fn features(points: &[[f32; 3]], colors: &[[f32; 3]], config: &NetworkConfig) -> Vec<f32> {
+/// Each point minus the mean of the cloud within `radius` of it, in units of `radius`: it points out of a thin part's side.
+///
+/// Opposite sides of a handle differ in little else; without it a network takes long to tell the two fingers' sides apart.
+pub(crate) fn outward(points: &[[f32; 3]], radius: f32) -> Vec<[f32; 3]> {
+    let one = |&point: &[f32; 3]| {
+        let mut sums = [0.0_f64; 4];
+        for &other in points.iter().filter(|&&other| squared_distance(point, other) <= radius * radius) {
+            (0..3).for_each(|axis| sums[axis] += f64::from(point[axis]) - f64::from(other[axis]));
+            sums[3] += 1.0;
+        }
+        [0, 1, 2].map(|axis| (sums[axis] / (sums[3] * f64::from(radius))) as f32)
+    };
+    points.iter().map(one).collect()
+}
+
+/// Rows [x, y, z, r, g, b, outward offset] of a cloud in its frame, positions in `position_unit`, colours about zero.
+pub(crate) fn features(points: &[[f32; 3]], colors: &[[f32; 3]], outward: &[[f32; 3]], config: &NetworkConfig) -> Vec<f32> {
     let mut rows = Vec::with_capacity(points.len() * FEATURES);
-    for (p, c) in points.iter().zip(colors) {
+    for ((p, c), o) in points.iter().zip(colors).zip(outward) {
         rows.extend(p.map(|x| x / config.position_unit));
         rows.extend(c.map(|x| 2.0 * x - 1.0));
+        rows.extend(o.map(|x| 2.0 * x));
     }
     rows
 }
@@ -98,7 +159,18 @@ pub(crate) fn label_maps(points: &[[f32; 3]], contacts: &[[f32; 3]; FINGERS], si
     maps[0].iter().zip(&maps[1]).flat_map(|(&a, &b)| [a, b]).collect()
 }
 
-/// Rows [x, y, z, r, g, b, map of finger 1, map of finger 2] for the posterior encoder; each map in units of its largest value.
+/// Where each finger's map has its mean, centred frame in `position_unit`: six numbers, x, y, z of finger 1 and of finger 2.
+pub(crate) fn map_means(points: &[[f32; 3]], maps: &[f32], config: &NetworkConfig) -> [f32; 3 * FINGERS] {
+    let mut sums = [0.0_f64; 3 * FINGERS];
+    for (p, m) in points.iter().zip(maps.chunks_exact(FINGERS)) {
+        for (i, sum) in sums.iter_mut().enumerate() {
+            *sum += f64::from(m[i / 3]) * f64::from(p[i % 3]) / f64::from(config.position_unit);
+        }
+    }
+    sums.map(|sum| sum as f32)
+}
+
+/// Rows [features, map of finger 1, map of finger 2] for the posterior encoder; each map in units of its largest value.
 pub(crate) fn posterior_features(features: &[f32], maps: &[f32]) -> Vec<f32> {
     let largest = |finger: usize| maps.iter().skip(finger).step_by(FINGERS).fold(f32::MIN_POSITIVE, |a, &b| a.max(b));
     let largest = [largest(0), largest(1)];
@@ -130,23 +202,55 @@ mod tests {
         assert_eq!(label_map(&points, [0.0749, 0.0, 0.0], 0.008), vec![0.0, 1.0]);
     }
 
+    fn frame(points: &[[f32; 3]]) -> Vec<[f32; 3]> {
+        let config = NetworkConfig::small();
+        Frame::of(points, &vec![0.01; points.len()], &config).place(points, &config)
+    }
+
     #[test]
     fn the_frame_follows_the_object_and_keeps_heights() {
+        // A T whose stem is long: the frame's x axis runs along the stem, to its foot.
+        let mut scene: Vec<[f32; 3]> = (0..40).map(|i| [1.0 + 0.002 * i as f32, 2.0, 0.02]).collect();
+        scene.extend((0..31).map(|i| [1.0, 1.985 + 0.001 * i as f32, 0.04]));
+        scene.push([5.0, -3.0, 0.0]);
+        let there = frame(&scene);
         let config = NetworkConfig::small();
-        let scene = [[1.0, 2.0, 0.02], [1.2, 2.0, 0.04], [1.0, 2.2, 0.04], [1.2, 2.2, 0.04], [5.0, -3.0, 0.0]];
-        let centred = centre(&scene, &config);
-        assert!((centred[0][0] + 0.1).abs() < 1e-6 && (centred[3][1] - 0.1).abs() < 1e-6);
-        assert!((centred[1][2] - (0.04 - config.height_origin)).abs() < 1e-7);
-        let flat = centre(&[[1.0, 0.0, 0.0], [3.0, 0.0, 0.001]], &config);
-        assert_eq!([flat[0][0], flat[1][0]], [-1.0, 1.0]);
+        assert!((there[39][0] - there[0][0] - 0.078).abs() < 1e-5 && (there[39][1] - there[0][1]).abs() < 1e-3, "{there:?}");
+        assert!((there[0][2] - (0.02 - config.height_origin)).abs() < 1e-7);
+        let (sin, cos) = 2.0_f32.sin_cos();
+        let turned: Vec<[f32; 3]> = scene.iter().map(|p| [cos * p[0] - sin * p[1], sin * p[0] + cos * p[1], p[2]]).collect();
+        for (a, b) in there.iter().zip(frame(&turned)).take(71) {
+            assert!((0..3).all(|axis| (a[axis] - b[axis]).abs() < 1e-5), "{a:?} {b:?}");
+        }
+        assert!(frame(&[[1.0, 0.0, 0.0], [3.0, 0.0, 0.001]]).iter().flatten().all(|x| x.is_finite()));
     }
 
     #[test]
     fn a_few_points_of_an_arm_hardly_move_the_frame() {
-        let mut points: Vec<[f64; 2]> = (0..80).map(|i| [f64::from(i % 9) * 0.01, f64::from(i % 5) * 0.01]).collect();
+        let mut points: Vec<[f64; 3]> = (0..80).map(|i| [f64::from(i % 9) * 0.01, f64::from(i % 5) * 0.01, 1.0]).collect();
         let alone = geometric_median(&points);
-        points.extend([[0.3, 0.4]; 16]);
+        points.extend([[0.3, 0.4, 1.0]; 16]);
         let beside = geometric_median(&points);
         assert!((beside[0] - alone[0]).hypot(beside[1] - alone[1]) < 0.01, "{alone:?} {beside:?}: a mean moves by 0.08");
+    }
+
+    #[test]
+    fn outward_points_out_of_either_side_of_a_bar() {
+        let bar: Vec<[f32; 3]> =
+            (0..80).map(|i| [(i / 2) as f32 * 0.002, if i % 2 == 0 { 0.008 } else { -0.008 }, 0.0]).collect();
+        let found = outward(&bar, 0.0205);
+        for (i, o) in found.iter().enumerate().skip(24).take(32) {
+            let side = if i % 2 == 0 { 1.0 } else { -1.0 };
+            // 21 points on the own side, 13 on the other one (within 12 mm along), 16 mm away.
+            assert!((o[1] - side * 13.0 / 34.0 * 16.0 / 20.5).abs() < 1e-4 && o[0].abs() < 1e-5, "{o:?}");
+        }
+        assert_eq!(outward(&[[1.0; 3]], 0.02), vec![[0.0; 3]]);
+    }
+
+    #[test]
+    fn map_means_are_weighted_positions() {
+        let config = NetworkConfig { position_unit: 0.5, ..NetworkConfig::small() };
+        let points = [[1.0, 0.0, 2.0], [3.0, 4.0, 0.0]];
+        assert_eq!(map_means(&points, &[0.25, 1.0, 0.75, 0.0], &config), [5.0, 6.0, 1.0, 2.0, 0.0, 4.0]);
     }
 }

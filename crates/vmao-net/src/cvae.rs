@@ -7,13 +7,19 @@ use crate::batch::Batch;
 use crate::cloud::FEATURES;
 use crate::config::{LatentPlacement, ModelKind, NetworkConfig};
 use crate::kernels::cross_entropy::FINGERS;
-use crate::layers::{NormLinear, Pass, PlainLinear, SetAbstraction, SetUpConv};
+use crate::layers::{ModulatedHead, NormLinear, Pass, PlainLinear, SetAbstraction, SetUpConv};
 use crate::parameters::Layout;
 use crate::tape::PointBackend;
 use burn::tensor::{Tensor, TensorData};
 
 /// Largest size of a log variance: beyond it the divergence overflows before it says anything.
 pub(crate) const LOG_VARIANCE_LIMIT: f32 = 10.0;
+
+/// Coordinates of the two maps' means, which the posterior reads beside its pooled features: what a maximum over points finds last.
+const MAP_MEANS: usize = 3 * FINGERS;
+
+/// Modulators of the last layer that the scene sets: enough for a direction or two.
+const CONTEXT: usize = 4;
 
 /// The layers of one network.
 #[derive(Debug)]
@@ -23,7 +29,9 @@ pub(crate) struct Cvae {
     /// Coarsest first.
     pub(crate) decoder: Vec<SetUpConv>,
     pub(crate) head: NormLinear,
-    pub(crate) logits: PlainLinear,
+    /// From the coarsest scene features to the scene's share of the last layer's modulators.
+    pub(crate) context: PlainLinear,
+    pub(crate) logits: ModulatedHead,
     pub(crate) placement: LatentPlacement,
     latent_size: usize,
 }
@@ -61,8 +69,8 @@ impl Cvae {
         let top = scene[scene.len() - 1].channels();
         let posterior = (kind == ModelKind::Vmao).then(|| Posterior {
             encoder: encoder(layout, "posterior", FEATURES + FINGERS),
-            mean: PlainLinear::new(layout, "posterior.mean", top, config.latent_size),
-            log_variance: PlainLinear::new(layout, "posterior.log_variance", top, config.latent_size),
+            mean: PlainLinear::new(layout, "posterior.mean", top + MAP_MEANS, config.latent_size),
+            log_variance: PlainLinear::new(layout, "posterior.log_variance", top + MAP_MEANS, config.latent_size),
         });
         let latent = if kind == ModelKind::Vmao { config.latent_size } else { 0 };
         let latent_in_skip = if config.latent_placement == LatentPlacement::EveryLevel { latent } else { 0 };
@@ -76,8 +84,9 @@ impl Cvae {
             decoder.push(layer);
         }
         let head = NormLinear::new(layout, "decoder.head", coarse, config.head);
-        let logits = PlainLinear::new(layout, "decoder.logits", config.head, FINGERS);
-        Self { scene, posterior, decoder, head, logits, placement: config.latent_placement, latent_size: latent }
+        let context = PlainLinear::new(layout, "decoder.context", top, CONTEXT);
+        let logits = ModulatedHead::new(layout, "decoder.logits", config.head, latent + CONTEXT, FINGERS);
+        Self { scene, posterior, decoder, head, context, logits, placement: config.latent_placement, latent_size: latent }
     }
 
     /// Z, or zero without latent code.
@@ -101,13 +110,17 @@ impl Cvae {
         let scene = encode(&self.scene, pass, &features, batch);
         let mut kl = None;
         let latent = self.posterior.as_ref().map(|posterior| {
-            let (mean, log_variance) =
-                posterior.forward(pass, batch, &constant(batch.posterior_features.clone(), FEATURES + FINGERS));
+            let (mean, log_variance) = {
+                let rows = constant(batch.posterior_features.clone(), FEATURES + FINGERS);
+                posterior.forward(pass, batch, &rows, constant(batch.map_means.clone(), MAP_MEANS))
+            };
             kl = Some(divergence(mean.clone(), log_variance.clone()).div_scalar(batch.clouds as f32));
             mean + log_variance.mul_scalar(0.5).exp() * constant(noise, self.latent_size)
         });
         let levels = self.scene.len();
         let mut coarse = scene[levels - 1].clone();
+        let mut modulators = vec![self.context.forward(pass, pool_clouds(coarse.clone(), batch.clouds))];
+        modulators.extend(latent.clone());
         if let Some(z) = &latent {
             coarse = Tensor::cat(vec![coarse, B::gather(z.clone(), &batch.owners[levels])], 1);
         }
@@ -120,25 +133,25 @@ impl Cvae {
             coarse = layer.forward(pass, coarse, skip, &batch.up[fine]);
         }
         let hidden = self.head.forward(pass, coarse, 1);
-        let logits = self.logits.forward(pass, hidden);
+        let logits = self.logits.forward(pass, hidden, Tensor::cat(modulators, 1), &batch.starts);
         Terms { reconstruction: B::cross_entropy(logits, &batch.targets, &batch.starts), kl }
     }
 }
 
 impl Posterior {
-    /// Mean and log variance, clouds × Z.
+    /// Mean and log variance, clouds × Z; `means` clouds × 6.
     fn forward<B: PointBackend>(
         &self,
         pass: &mut Pass<B>,
         batch: &Batch,
         features: &Tensor<B, 2>,
+        means: Tensor<B, 2>,
     ) -> (Tensor<B, 2>, Tensor<B, 2>) {
         let mut levels = encode(&self.encoder, pass, features, batch);
         let top = levels.remove(levels.len() - 1);
-        let [rows, _] = top.dims();
-        let pooled = B::max_pool(top, rows / batch.clouds);
-        let log_variance = self.log_variance.forward(pass, pooled.clone()).clamp(-LOG_VARIANCE_LIMIT, LOG_VARIANCE_LIMIT);
-        (self.mean.forward(pass, pooled), log_variance)
+        let read = Tensor::cat(vec![pool_clouds(top, batch.clouds), means], 1);
+        let log_variance = self.log_variance.forward(pass, read.clone()).clamp(-LOG_VARIANCE_LIMIT, LOG_VARIANCE_LIMIT);
+        (self.mean.forward(pass, read), log_variance)
     }
 }
 
@@ -155,6 +168,12 @@ fn encode<B: PointBackend>(
         out.push(layer.forward(pass, finer, balls));
     }
     out
+}
+
+/// The largest of each feature over the coarsest points of each cloud.
+fn pool_clouds<B: PointBackend>(top: Tensor<B, 2>, clouds: usize) -> Tensor<B, 2> {
+    let [rows, _] = top.dims();
+    B::max_pool(top, rows / clouds)
 }
 
 /// Σ over rows and columns of ½ (μ² + σ² − 1 − ln σ²): KL(N(μ, σ²) ‖ N(0, 1)) (Kingma & Welling 2014, appendix B).

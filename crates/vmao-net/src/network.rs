@@ -1,14 +1,15 @@
 //! Prediction: a trained network on plain slices, normalisations folded away, no automatic differentiation.
 
-use crate::batch::Prepared;
+use crate::augment::View;
+use crate::batch::{Prepared, read};
 use crate::checkpoint::Checkpoint;
-use crate::cloud::{centre, check_cloud, features, posterior_features};
+use crate::cloud::{check_cloud, features, map_means, posterior_features};
 use crate::config::{LatentPlacement, ModelKind, NetworkConfig};
 use crate::cvae::{Cvae, LOG_VARIANCE_LIMIT};
 use crate::error::Error;
 use crate::kernels::cross_entropy::{FINGERS, softmax};
 use crate::kernels::max_pool::max_pool;
-use crate::layers::{Folded, FoldedGroup, FoldedUpConv, Head, SetAbstraction};
+use crate::layers::{Folded, FoldedGroup, FoldedModulated, FoldedUpConv, Head, SetAbstraction};
 use crate::parameters::Parameters;
 use crate::pyramid::{Flow, Pyramid};
 use vmao_core::contact::ContactMap;
@@ -22,7 +23,8 @@ pub struct ContactNetwork {
     posterior: Option<(Encoder, Head, Head)>,
     decoder: Vec<FoldedUpConv>,
     head: Folded,
-    logits: Head,
+    context: Head,
+    logits: FoldedModulated,
 }
 
 type Encoder = Vec<(FoldedGroup, usize)>;
@@ -55,6 +57,7 @@ impl ContactNetwork {
                 .map(|p| (encoder(&p.encoder), p.mean.fold(parameters), p.log_variance.fold(parameters))),
             decoder: cvae.decoder.iter().map(|layer| layer.fold(parameters)).collect(),
             head: cvae.head.fold(parameters),
+            context: cvae.context.fold(parameters),
             logits: cvae.logits.fold(parameters),
         }
     }
@@ -84,10 +87,8 @@ impl ContactNetwork {
     /// The part of [`ContactNetwork::map`] that does not depend on the latent code.
     pub fn encode(&self, points: &[[f32; 3]], colors: &[[f32; 3]]) -> Result<EncodedScene, Error> {
         check_cloud(points, colors, self.fewest_points())?;
-        let pyramid = Pyramid::new(points, &self.config);
-        let points = pyramid.sort(&centre(points, &self.config));
-        let colors = pyramid.sort(colors);
-        Ok(self.encode_ordered(pyramid, points, &colors))
+        let (pyramid, cloud) = read(points, colors, &self.config);
+        Ok(self.encode_ordered(pyramid, cloud))
     }
 
     /// The part of [`ContactNetwork::map`] that depends on the latent code.
@@ -107,15 +108,15 @@ impl ContactNetwork {
         Ok(ContactMap { fingers })
     }
 
-    fn encode_ordered(&self, pyramid: Pyramid, points: Vec<[f32; 3]>, colors: &[[f32; 3]]) -> EncodedScene {
-        let features = features(&points, colors, &self.config);
-        let levels = run(&self.scene, &features, &pyramid, &points);
-        EncodedScene { pyramid, points, features, levels }
+    fn encode_ordered(&self, pyramid: Pyramid, cloud: View) -> EncodedScene {
+        let features = features(&cloud.points, &cloud.colors, &cloud.outward, &self.config);
+        let levels = run(&self.scene, &features, &pyramid, &cloud.points);
+        EncodedScene { pyramid, points: cloud.points, features, levels }
     }
 
     /// A prepared example, not augmented.
     pub(crate) fn encode_prepared(&self, example: &Prepared) -> EncodedScene {
-        self.encode_ordered(example.pyramid.clone(), example.points.clone(), &example.colors)
+        self.encode_ordered(example.pyramid.clone(), example.cloud.clone())
     }
 
     /// Mean and log variance of q(z | scene, maps); maps in the order of the scene's points.
@@ -125,7 +126,8 @@ impl ContactNetwork {
         let levels = run(encoder, &rows, &scene.pyramid, &scene.points);
         let top = &levels[levels.len() - 1];
         let k = scene.pyramid.counts[levels.len()];
-        let pooled = max_pool(top, k, top.len() / k).0;
+        let mut pooled = max_pool(top, k, top.len() / k).0;
+        pooled.extend(map_means(&scene.points, maps, &self.config));
         let clamp = |v: f32| v.clamp(-LOG_VARIANCE_LIMIT, LOG_VARIANCE_LIMIT);
         Some((mean.apply(&pooled), log_variance.apply(&pooled).into_iter().map(clamp).collect()))
     }
@@ -150,7 +152,9 @@ impl ContactNetwork {
         }
         let mut hidden = Vec::new();
         self.head.apply(&coarse, &mut hidden);
-        self.logits.apply(&hidden)
+        let mut modulators = self.context.apply(&max_pool(top, count, top.len() / count).0);
+        modulators.extend_from_slice(latent);
+        self.logits.apply(&hidden, &modulators)
     }
 }
 

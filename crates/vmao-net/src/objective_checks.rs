@@ -45,7 +45,7 @@ fn example(seed: u64) -> Example {
 
 fn batch(config: &NetworkConfig, count: u64) -> (Vec<Prepared>, Batch) {
     let prepared: Vec<Prepared> = (0..count).map(|i| Prepared::new(&example(i), config, &mut Stream::new(0, &[i]))).collect();
-    let members: Vec<_> = prepared.iter().map(|p| (p, p.points.clone(), p.colors.clone())).collect();
+    let members: Vec<_> = prepared.iter().map(|p| (p, p.cloud.clone())).collect();
     let batch = Batch::new(&members, config);
     (prepared, batch)
 }

@@ -31,9 +31,9 @@ pub(crate) enum Flow {
 }
 
 impl Pyramid {
-    /// Orders `points` (at least `config.fewest_points()`) and finds all neighbours.
-    pub(crate) fn new(points: &[[f32; 3]], config: &NetworkConfig) -> Self {
-        let order = farthest_point_order(points, &weights(points, config.density_power), points.len());
+    /// Orders `points` (at least `config.fewest_points()`), `spacing` apart, and finds all neighbours.
+    pub(crate) fn new(points: &[[f32; 3]], spacing: &[f32], config: &NetworkConfig) -> Self {
+        let order = farthest_point_order(points, &weights(spacing, config.density_power), points.len());
         let ordered: Vec<[f32; 3]> = order.iter().map(|&i| points[i as usize]).collect();
         let mut counts = vec![points.len()];
         let (mut balls, mut near) = (Vec::new(), Vec::new());
@@ -80,17 +80,20 @@ impl Pyramid {
 ///
 /// With power 0 centroids cover space evenly; with 1 they are as dense as the points are, so that a bare table and the arms, which
 /// the cameras sample thinly, do not take the centroids away from the object.
-fn weights(points: &[[f32; 3]], power: f32) -> Vec<f32> {
-    if power == 0.0 {
-        return vec![1.0; points.len()];
-    }
+fn weights(spacing: &[f32], power: f32) -> Vec<f32> {
+    spacing.iter().map(|s| s.max(SMALLEST_SPACING).powf(-power)).collect()
+}
+
+/// Mean distance of each point to its nearest ones (m).
+///
+/// The mean, not the last: a centroid that is a point's last neighbour would lie at exactly one spacing from it, and so tie.
+pub(crate) fn spacing(points: &[[f32; 3]]) -> Vec<f32> {
     let k = SPACING_NEIGHBOURS.min(points.len());
     let near = nearest(points, points, k);
-    // The mean, not the last: a centroid that is a point's last neighbour would lie at exactly one spacing from it, and so tie.
-    let spacing = |(point, near): (&[f32; 3], &[u32])| {
+    let one = |(point, near): (&[f32; 3], &[u32])| {
         near.iter().map(|&other| squared_distance(*point, points[other as usize]).sqrt()).sum::<f32>() / k as f32
     };
-    points.iter().zip(near.chunks_exact(k)).map(spacing).map(|s| s.max(SMALLEST_SPACING).powf(-power)).collect()
+    points.iter().zip(near.chunks_exact(k)).map(one).collect()
 }
 
 /// How many nearest points, itself included, measure the spacing around a point by their mean distance.
@@ -113,7 +116,7 @@ mod tests {
         let points: Vec<[f32; 3]> = (0..300).map(|_| std::array::from_fn(|_| s.range(0.0, 0.1) as f32)).collect();
         let mut config = NetworkConfig::small();
         config.abstraction[0].num_centroids = 100;
-        let pyramid = Pyramid::new(&points, &config);
+        let pyramid = Pyramid::new(&points, &spacing(&points), &config);
         let ordered = pyramid.sort(&points);
         let radius = config.abstraction[0].radius;
         for flow in [Flow::Down, Flow::Up] {
@@ -138,9 +141,12 @@ mod tests {
         let points: Vec<[f32; 3]> = (0..700).map(|_| std::array::from_fn(|_| s.range(0.0, 0.1) as f32)).collect();
         let shuffle = s.permutation(points.len());
         let listed: Vec<[f32; 3]> = shuffle.iter().map(|&i| points[i]).collect();
-        let back: Vec<u32> =
-            Pyramid::new(&listed, &NetworkConfig::small()).order.iter().map(|&i| shuffle[i as usize] as u32).collect();
-        assert_eq!(back, Pyramid::new(&points, &NetworkConfig::small()).order);
+        let back: Vec<u32> = Pyramid::new(&listed, &spacing(&listed), &NetworkConfig::small())
+            .order
+            .iter()
+            .map(|&i| shuffle[i as usize] as u32)
+            .collect();
+        assert_eq!(back, Pyramid::new(&points, &spacing(&points), &NetworkConfig::small()).order);
     }
 
     #[test]
@@ -149,7 +155,7 @@ mod tests {
         let mut points: Vec<[f32; 3]> = (0..150).map(|_| [s.range(-0.3, 0.3) as f32, s.range(-0.3, 0.3) as f32, 0.0]).collect();
         points.extend((0..350).map(|_| [s.range(-0.05, 0.05) as f32, s.range(-0.01, 0.01) as f32, s.range(0.0, 0.02) as f32]));
         let on_object = |density_power: f32| {
-            let pyramid = Pyramid::new(&points, &NetworkConfig { density_power, ..NetworkConfig::small() });
+            let pyramid = Pyramid::new(&points, &spacing(&points), &NetworkConfig { density_power, ..NetworkConfig::small() });
             pyramid.order[..100].iter().filter(|&&i| i >= 150).count()
         };
         assert!(on_object(0.0) < 20 && (55..85).contains(&on_object(1.0)), "{} {}", on_object(0.0), on_object(1.0));

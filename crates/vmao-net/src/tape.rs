@@ -4,6 +4,7 @@
 
 use crate::kernels::edge::{self, Edges};
 use crate::kernels::gather::Picks;
+use crate::kernels::modulated::{self, Shape};
 use crate::kernels::norm::{Moments, Tape};
 use crate::kernels::{cross_entropy, linear, max_pool};
 use burn::backend::autodiff::checkpoint::base::Checkpointer;
@@ -42,6 +43,15 @@ pub(crate) trait PointBackend: AutodiffBackend {
 
     /// x W + b.
     fn affine(x: Tensor<Self, 2>, weight: Tensor<Self, 2>, bias: Tensor<Self, 2>) -> Tensor<Self, 2>;
+
+    /// h W(m) + b, W(m) = W₀ + Σᵢ mᵢ Wᵢ with the modulators m of the cloud that a row belongs to.
+    fn modulated(
+        h: Tensor<Self, 2>,
+        m: Tensor<Self, 2>,
+        weight: Tensor<Self, 2>,
+        bias: Tensor<Self, 2>,
+        starts: &[usize],
+    ) -> Tensor<Self, 2>;
 
     /// The rows of x named by `picks`.
     fn gather(x: Tensor<Self, 2>, picks: &Arc<Picks>) -> Tensor<Self, 2>;
@@ -129,6 +139,22 @@ impl PointBackend for Cpu {
         close!(Linear, [xn, wn, bn], (x, w, channels), y)
     }
 
+    fn modulated(
+        h: Tensor<Self, 2>,
+        m: Tensor<Self, 2>,
+        weight: Tensor<Self, 2>,
+        bias: Tensor<Self, 2>,
+        starts: &[usize],
+    ) -> Tensor<Self, 2> {
+        let ([rows, inputs], [clouds, modulators], [weight_rows, channels]) = (h.dims(), m.dims(), weight.dims());
+        assert_eq!(weight_rows, (1 + modulators) * inputs, "inputs of a modulated layer");
+        assert_eq!((clouds + 1, rows), (starts.len(), starts[clouds]), "clouds and rows of a modulated layer");
+        let ((hn, h), (mn, m), (wn, w), (bn, b)) = (open!(h), open!(m), open!(weight), open!(bias));
+        let shape = Shape { starts: starts.to_vec(), inputs, modulators, channels };
+        let y = tensor(modulated::modulated(values(&h), values(&m), values(&w), values(&b), &shape), &[rows, channels]);
+        close!(Modulated, [hn, mn, wn, bn], (h, m, w, Arc::new(shape)), y)
+    }
+
     fn gather(x: Tensor<Self, 2>, picks: &Arc<Picks>) -> Tensor<Self, 2> {
         let [_, channels] = x.dims();
         let (xn, x) = open!(x);
@@ -209,6 +235,27 @@ impl Backward<Flex, 3> for Linear {
         let [xn, wn, bn] = &ops.parents;
         let rows = dx.len() / inputs;
         hand_out!(grads, xn => dx, &[rows, inputs]; wn => dw, &[inputs, *channels]; bn => db, &[1, *channels]);
+    }
+}
+
+#[derive(Debug)]
+struct Modulated;
+
+impl Backward<Flex, 4> for Modulated {
+    type State = (FlexTensor, FlexTensor, FlexTensor, Arc<Shape>);
+
+    fn backward(self, ops: Ops<Self::State, 4>, grads: &mut Gradients, _: &mut Checkpointer) {
+        let (h, m, w, shape) = &ops.state;
+        let dy = grads.consume::<Flex>(&ops.node).to_contiguous();
+        let [dh, dm, dw, db] = modulated::modulated_backward(values(h), values(m), values(w), values(&dy), shape);
+        let Shape { starts, inputs, modulators, channels } = &**shape;
+        let (clouds, rows) = (starts.len() - 1, starts[starts.len() - 1]);
+        let [hn, mn, wn, bn] = &ops.parents;
+        hand_out!(grads,
+            hn => dh, &[rows, *inputs];
+            mn => dm, &[clouds, *modulators];
+            wn => dw, &[(1 + modulators) * inputs, *channels];
+            bn => db, &[1, *channels]);
     }
 }
 
@@ -337,6 +384,18 @@ mod tests {
         let stock = x.clone().select(0, Tensor::<Cpu, 1, Int>::from_data(index, &Default::default()));
         agree(from_ref(&x), Cpu::gather(x.clone(), &Arc::new(Picks::new(sources, 300))), stock);
         agree(from_ref(&x), Cpu::max_pool(x.clone(), 5), stock_max(x.clone(), 5));
+    }
+
+    #[test]
+    fn the_modulated_layer_agrees_with_burns_own_operations() {
+        let [h, m, w, b] = [leaf(1, 31, 5), leaf(2, 2, 3), leaf(3, 20, 4), leaf(4, 1, 4)];
+        let picks = Arc::new(Picks::new((0..31).map(|row| u32::from(row >= 12)).collect(), 2));
+        let rows = Cpu::gather(m.clone(), &picks);
+        let products = (0..3).map(|i| h.clone() * rows.clone().slice(s![.., i..i + 1]));
+        let stacked = Tensor::cat(std::iter::once(h.clone()).chain(products).collect(), 1);
+        let stock = stacked.matmul(w.clone()) + b.clone();
+        let fused = Cpu::modulated(h.clone(), m.clone(), w.clone(), b.clone(), &[0, 12, 31]);
+        agree(&[h, m, w, b], fused, stock);
     }
 
     #[test]

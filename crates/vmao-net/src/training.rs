@@ -161,8 +161,7 @@ impl Trainer {
                 .par_iter()
                 .map(|&i| {
                     let mut stream = Stream::new(seed, &[LABEL_AUGMENT, epoch as u64, i as u64]);
-                    let (points, colors) = prepared[i].augmented(augmentation, &mut stream);
-                    (&prepared[i], points, colors)
+                    (&prepared[i], prepared[i].augmented(augmentation, &mut stream))
                 })
                 .collect();
             let batch = Batch::new(&clouds, &self.network);
@@ -245,7 +244,7 @@ impl Trainer {
                 }
             }
             let logits = network.logits(&scene, &latent);
-            (cross_entropy(&logits, &example.maps, &[0, example.points.len()]).0, kl)
+            (cross_entropy(&logits, &example.maps, &[0, example.cloud.points.len()]).0, kl)
         };
         let terms: Vec<(f32, f32)> = members.par_iter().map(term).collect();
         let mean = |sum: f32| sum / terms.len() as f32;

@@ -82,7 +82,7 @@ fn a_wrong_shape_names_the_tensor_and_both_shapes() {
 fn a_missing_and_a_foreign_tensor_are_named() {
     let missing = rewritten(|name, shape, data| (name != "posterior.mean.bias").then_some((Dtype::F32, shape, data)));
     let error = refused(&missing).to_string();
-    assert!(error.starts_with("the checkpoint has no tensor `posterior.mean.bias`; it has: decoder.head.norm.bias, "), "{error}");
+    assert!(error.starts_with("the checkpoint has no tensor `posterior.mean.bias`; it has: decoder.context.bias, "), "{error}");
     let config = checkpoint().config_json().unwrap().replace("\"vmao\"", "\"top1\"");
     let as_top1 = Checkpoint::from_safetensors(&checkpoint().to_safetensors().unwrap(), &config).unwrap_err().to_string();
     assert!(as_top1.starts_with("tensor `decoder.up_conv.0.mlp.0.weight` is F32 ["), "{as_top1}");

@@ -29,6 +29,7 @@ fn vmao_finds_both_places_with_both_fingers_opposite_and_its_latent_code_does_no
     assert!(last.training.kl > std::f32::consts::LN_2, "one bit at least: which of the two places; {last:?}");
     assert!(last.validation.unwrap().reconstruction < reports[0].validation.unwrap().reconstruction - 1.0, "{last:?}");
     assert!(score.both > 0.9 && (0.25..0.75).contains(&score.positive), "both places are found: {score:?}");
+    assert!(score.across > 0.8, "on either side of the bar: {score:?}");
     assert!(score.same_mode > 0.8, "the fingers agree on the place: {score:?}");
     assert!(score.hits > 0.75 && score.mean_error < 0.006, "and touch where they may: {score:?}");
 }

@@ -10,6 +10,7 @@ pub(crate) mod gather;
 pub(crate) mod linear;
 pub(crate) mod matmul;
 pub(crate) mod max_pool;
+pub(crate) mod modulated;
 pub(crate) mod norm;
 
 #[cfg(test)]

@@ -3,12 +3,14 @@
 #[cfg(test)]
 mod closed_form;
 mod dense;
+mod modulated_head;
 mod norm_linear;
 mod set_abstraction;
 mod set_up_conv;
 mod shared_mlp;
 
 pub(crate) use dense::{Head, PlainLinear};
+pub(crate) use modulated_head::{FoldedModulated, ModulatedHead};
 pub(crate) use norm_linear::{Folded, NormLinear};
 pub(crate) use set_abstraction::SetAbstraction;
 pub(crate) use set_up_conv::{FoldedUpConv, SetUpConv};

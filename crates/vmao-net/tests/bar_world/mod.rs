@@ -85,6 +85,8 @@ pub(crate) struct Peaks {
     pub(crate) error: [f64; 2],
     /// How far the peaks are apart along the bar (m); zero is exactly opposite.
     pub(crate) shift: f64,
+    /// Whether the peaks lie on different sides of the bar.
+    pub(crate) across: bool,
     /// Which cluster each peak is nearer to.
     pub(crate) modes: [f64; 2],
 }
@@ -108,6 +110,7 @@ impl Scene {
         Peaks {
             error: [error(at[0], 1.0), error(at[1], -1.0)],
             shift: (at[0][0] - at[1][0]).abs(),
+            across: at[0][1] * at[1][1] < 0.0,
             modes: at.map(|p| p[0].signum()),
         }
     }
@@ -133,6 +136,8 @@ pub(crate) struct Score {
     pub(crate) error_90: f64,
     /// Share of samples whose peaks are within 10 mm of exactly opposite.
     pub(crate) opposite: f64,
+    /// Share of samples whose peaks lie on different sides of the bar.
+    pub(crate) across: f64,
     /// Share of samples whose two peaks are in the same cluster.
     pub(crate) same_mode: f64,
     /// Share of scenes where the samples reach both clusters.
@@ -155,6 +160,7 @@ pub(crate) fn score(network: &vmao_net::ContactNetwork, held_out: &[Scene], per_
             let peaks = scene.peaks(&network.decode(&encoded, &latent).unwrap());
             errors.extend(peaks.error);
             score.opposite += if peaks.shift < 0.010 { weight } else { 0.0 };
+            score.across += if peaks.across { weight } else { 0.0 };
             score.same_mode += if peaks.modes[0] == peaks.modes[1] { weight } else { 0.0 };
             score.positive += if peaks.modes[0] > 0.0 { weight } else { 0.0 };
             low |= peaks.modes[0] < 0.0;
