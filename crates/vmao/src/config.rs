@@ -1,6 +1,6 @@
 //! The configuration of a run. The shipped file is the experiment: there are no defaults anywhere else.
 //!
-//! To add a constant: one commented line in `configs/demo.toml`, one field here, one line in [`Config::check`].
+//! To add a constant: one commented line in `configs/demo.toml`, one field here, one line in `Config::check`.
 
 use crate::{
     config_layers::{self, Layer},

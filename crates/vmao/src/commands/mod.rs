@@ -1,7 +1,7 @@
 //! The command line: one module for each command.
 //!
 //! To add a command: a module here with its `clap::Args` (flatten [`CommonOptions`] into it) and
-//! `pub(super) fn run(arguments, &Session) -> Result<(), Failure>`, and its line in [`Command`] and in [`execute`].
+//! `pub(super) fn run(arguments, &Session) -> Result<(), Failure>`, and its line in `Command` and in `execute`.
 
 mod demo;
 mod evaluate;
