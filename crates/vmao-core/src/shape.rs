@@ -68,3 +68,12 @@ impl Shape {
         }
     }
 }
+
+impl Solid {
+    /// Height of its lowest point with its carrier at `world_from_carrier` (m).
+    pub fn lowest_point(&self, world_from_carrier: &Pose) -> f64 {
+        let world_from_solid = world_from_carrier * self.carrier_from_solid;
+        let up = world_from_solid.inverse_transform_vector(&nalgebra::Vector3::z());
+        world_from_solid.translation.z - self.shape.extent_along(&up)
+    }
+}

@@ -82,12 +82,6 @@ pub(crate) fn gripper_solids(robot: &RobotModel, opening: f64) -> Vec<Solid> {
 /// Height of the gripper's lowest point with its tool at `world_from_tool` (m).
 pub(crate) fn lowest_gripper_point(robot: &RobotModel, world_from_tool: &Pose, opening: f64) -> f64 {
     let tool_from_last = (robot.gripper.last_from_hand * robot.gripper.hand_from_tool).inverse();
-    gripper_solids(robot, opening)
-        .iter()
-        .map(|solid| {
-            let world_from_solid = world_from_tool * tool_from_last * solid.carrier_from_solid;
-            let up = world_from_solid.inverse_transform_vector(&nalgebra::Vector3::z());
-            world_from_solid.translation.z - solid.shape.extent_along(&up)
-        })
-        .fold(f64::INFINITY, f64::min)
+    let world_from_last = world_from_tool * tool_from_last;
+    gripper_solids(robot, opening).iter().map(|solid| solid.lowest_point(&world_from_last)).fold(f64::INFINITY, f64::min)
 }

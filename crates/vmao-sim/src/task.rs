@@ -74,14 +74,9 @@ pub(crate) fn sample_start(scene: &Scene, config: &StartConfig, stream: &mut Str
 /// Height of the lowest point of the object.
 fn lowest_point(scene: &Scene, world_from_root: &Pose, joints: &[f64]) -> f64 {
     let parts = part_poses(&scene.object, &scene.graph, PartId(0), world_from_root, joints);
-    let solids =
-        scene.object.parts.iter().zip(&parts).flat_map(|(part, pose)| part.solids.iter().map(move |solid| (solid, pose)));
-    solids
-        .map(|(solid, world_from_part)| {
-            let world_from_solid = world_from_part * solid.carrier_from_solid;
-            world_from_solid.translation.z - solid.shape.extent_along(&world_from_solid.inverse_transform_vector(&Vector3::z()))
-        })
-        .fold(f64::INFINITY, f64::min)
+    let placed = scene.object.parts.iter().zip(&parts);
+    let heights = placed.flat_map(|(part, pose)| part.solids.iter().map(move |solid| solid.lowest_point(pose)));
+    heights.fold(f64::INFINITY, f64::min)
 }
 
 /// A goal for an object that lies at `start`: lifted, moved, turned, tilted, every joint changed; never met at the start.
