@@ -2,9 +2,12 @@
 //!
 //! The simulator's model, the planner's collision model and the kinematic chain are all made from this one description.
 
+mod build;
 mod panda;
+mod sawyer;
 
 pub use panda::panda;
+pub use sawyer::{DEFAULT_SLOT, SLOTS, sawyer};
 
 use crate::{
     geometry::Pose,
@@ -115,12 +118,13 @@ impl RobotModel {
     pub fn named(name: &str) -> Option<Self> {
         match name {
             "panda" => Some(panda()),
+            "sawyer" => Some(sawyer(DEFAULT_SLOT)),
             _ => None,
         }
     }
 
     /// All names that [`RobotModel::named`] knows.
-    pub const NAMES: [&'static str; 1] = ["panda"];
+    pub const NAMES: [&'static str; 2] = ["panda", "sawyer"];
 
     /// The chain from the base to the tool frame between the pads.
     pub fn tool_chain(&self) -> SerialChain {

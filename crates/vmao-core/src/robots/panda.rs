@@ -1,16 +1,13 @@
 //! Franka Emika Panda with the Franka hand; numbers from the published kinematics and identified inertias
 //! (Menagerie `franka_emika_panda`, dm_robotics damping, franka_rust limits), solids fitted by us to the link extents.
 
-use super::{ArmJoint, Finger, Gripper, Inertial, Link, RobotModel};
-use crate::{
-    geometry::{Pose, pose, translation},
-    shape::{Shape, Solid},
+use super::{
+    ArmJoint, Finger, Gripper, Link, RobotModel,
+    build::{GREY, WHITE, brick, link, segment},
 };
-use nalgebra::{Matrix3, Point3, Rotation3, Translation3, UnitQuaternion, Vector3};
+use crate::geometry::{Pose, pose, translation};
+use nalgebra::{Translation3, UnitQuaternion, Vector3};
 use std::f64::consts::FRAC_PI_4;
-
-const WHITE: [f32; 3] = [0.92, 0.93, 0.94];
-const GREY: [f32; 3] = [0.35, 0.37, 0.40];
 
 /// The Panda and its hand. The tool frame lies between the pads, 0.1034 m from the hand, rotated with the hand.
 pub fn panda() -> RobotModel {
@@ -158,28 +155,4 @@ fn hand() -> Gripper {
         max_force: 35.0,
         hand_from_tool: translation(0.0, 0.0, 0.1034),
     }
-}
-
-/// `moments`: xx yy zz xy xz yz about the centre of mass.
-fn link(name: &'static str, mass: f64, center: [f64; 3], moments: [f64; 6], solids: Vec<Solid>) -> Link {
-    let [xx, yy, zz, xy, xz, yz] = moments;
-    let inertia = Matrix3::new(xx, xy, xz, xy, yy, yz, xz, yz, zz);
-    Link { name, inertial: Inertial { mass, center: Point3::from(center), inertia }, solids }
-}
-
-/// A capsule between two points of the link frame.
-fn segment(from: [f64; 3], to: [f64; 3], radius: f64, color: [f32; 3]) -> Solid {
-    let (from, to) = (Vector3::from(from), Vector3::from(to));
-    let along = to - from;
-    let turn = Rotation3::rotation_between(&Vector3::z(), &along)
-        .unwrap_or_else(|| Rotation3::from_axis_angle(&Vector3::x_axis(), std::f64::consts::PI));
-    Solid {
-        shape: Shape::Capsule { radius, half_length: along.norm() / 2.0 },
-        carrier_from_solid: Pose::from_parts(Translation3::from((from + to) / 2.0), UnitQuaternion::from_rotation_matrix(&turn)),
-        color,
-    }
-}
-
-fn brick(center: [f64; 3], half_extents: [f64; 3], color: [f32; 3]) -> Solid {
-    Solid { shape: Shape::Box { half_extents }, carrier_from_solid: translation(center[0], center[1], center[2]), color }
 }
