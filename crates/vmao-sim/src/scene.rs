@@ -1,6 +1,7 @@
 //! A scene: arms around a table, one object, the compiled simulator model and who owns which of its geoms.
 
 use crate::error::Error;
+use crate::layout::{BasePlacement, Layout, Spacing, base_poses};
 use crate::mjcf;
 
 use mujoco_rs::wrappers::mj_model::{MjModel, MjtObjBase};
@@ -33,24 +34,18 @@ impl Friction {
     }
 }
 
-/// How the arms stand around the table.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum Layout {
-    /// Alternately on both long sides, facing each other.
-    Opposed,
-}
-
 /// Physics and placement of a scene.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct SceneConfig {
     /// How the arms stand.
     pub layout: Layout,
-    /// Distance of the bases from the table's centre line (m).
+    /// Distance of the bases from the table's centre line, or from its centre in a ring (m).
     pub base_distance: f64,
     /// Distance between neighbours on one side (m).
     pub base_spacing: f64,
+    /// Where the bases stand in the layout `explicit`; empty in all others.
+    pub bases: Vec<BasePlacement>,
     /// Simulated time per step (s).
     pub timestep: f64,
     /// MuJoCo's `impratio`: how much stiffer friction is than the normal direction.
@@ -125,16 +120,17 @@ pub struct Scene {
 }
 
 impl Scene {
-    /// Compiles the scene. Fails if the simulator refuses the model.
+    /// Compiles the scene. Fails if the arms are fewer than the parts or cannot be placed, or the simulator refuses the model.
     pub fn new(config: &SceneConfig, robots: Vec<RobotModel>, item: CatalogueItem) -> Result<Self, Error> {
         let hold_fingers = hold_fingers(&item);
         let hold_centers = hold_fingers.iter().map(|[a, b]| nalgebra::center(a, b)).collect();
         let CatalogueItem { object, demonstrations } = item;
         let graph = ObjectGraph::of(&object).map_err(|cause| Error::Object { name: object.name.clone(), cause })?;
-        if robots.len() != object.parts.len() {
+        if robots.len() < object.parts.len() {
             return Err(Error::ArmCount { arms: robots.len(), parts: object.parts.len(), object: object.name });
         }
-        let world_from_bases = base_poses(config, robots.len());
+        let spacing = Spacing { distance: config.base_distance, between: config.base_spacing };
+        let world_from_bases = base_poses(config.layout, spacing, &config.bases, &robots)?;
         let mjcf = mjcf::scene(config, &robots, &world_from_bases, &object);
         let model = MjModel::from_xml_string(&mjcf).map_err(|cause| Error::Model { cause: cause.to_string() })?;
         let arms = robots.iter().enumerate().map(|(arm, robot)| arm_index(&model, arm, robot)).collect::<Result<Vec<_>, _>>()?;
@@ -183,21 +179,6 @@ fn hold_fingers(item: &CatalogueItem) -> Vec<[Point3<f64>; 2]> {
         Point3::from(points.iter().sum::<Vector3<f64>>() / points.len().max(1) as f64)
     };
     (0..item.object.parts.len()).map(|part| [mean(part, 0), mean(part, 1)]).collect()
-}
-
-/// Base poses of `count` arms; all face the table's centre.
-fn base_poses(config: &SceneConfig, count: usize) -> Vec<Pose> {
-    let Layout::Opposed = config.layout;
-    let sides = [count.div_ceil(2), count / 2];
-    (0..count)
-        .map(|arm| {
-            let (side, place) = (arm % 2, arm / 2);
-            let across = (place as f64 - (sides[side] as f64 - 1.0) / 2.0) * config.base_spacing;
-            let turn = if side == 0 { 0.0 } else { std::f64::consts::PI };
-            let x = if side == 0 { -config.base_distance } else { config.base_distance };
-            Pose::new(Vector3::new(x, across, 0.0), Vector3::z() * turn)
-        })
-        .collect()
 }
 
 fn id(model: &MjModel, kind: MjtObjBase, name: &str) -> Result<usize, Error> {
