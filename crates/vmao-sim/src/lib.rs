@@ -23,6 +23,7 @@ mod simulation;
 mod task;
 #[cfg(test)]
 mod tests;
+pub mod tracking;
 mod trial;
 
 pub use cameras::CameraConfig;

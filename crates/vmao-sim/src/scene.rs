@@ -13,7 +13,7 @@ use vmao_core::contact::{ArmId, ContactTuple, PartId};
 use vmao_core::geometry::Pose;
 use vmao_core::object::ArticulatedObject;
 use vmao_core::object_graph::ObjectGraph;
-use vmao_core::osc::{JOINTS, JointVector};
+use vmao_core::osc::{JOINTS, JointLimits, JointVector};
 use vmao_core::robots::RobotModel;
 
 /// Coulomb friction coefficients of a surface. In a contact the larger of the two surfaces' values counts.
@@ -83,7 +83,7 @@ pub(crate) struct ArmIndex {
     pub(crate) finger_qpos: usize,
     pub(crate) hand_body: usize,
     pub(crate) bodies: Vec<usize>,
-    pub(crate) max_torque: JointVector,
+    pub(crate) limits: JointLimits,
 }
 
 /// A compiled scene; shared by all trials that run on it.
@@ -216,7 +216,10 @@ fn arm_index(model: &MjModel, arm: usize, robot: &RobotModel) -> Result<ArmIndex
         finger_qpos,
         hand_body: id(model, MjtObjBase::mjOBJ_BODY, &mjcf::arm_name(arm, gripper.hand.name))?,
         bodies,
-        max_torque: JointVector::from_iterator(robot.joints.iter().map(|joint| joint.max_torque)),
+        limits: JointLimits {
+            torque: JointVector::from_iterator(robot.joints.iter().map(|joint| joint.max_torque)),
+            velocity: JointVector::from_iterator(robot.joints.iter().map(|joint| joint.max_velocity)),
+        },
     })
 }
 

@@ -266,6 +266,7 @@ fn check_control(grasp: &GraspConfig, motion: &MotionConfig, osc: &OscGains) -> 
     positive("osc.damping_ratio", osc.damping_ratio)?;
     within("osc.posture_stiffness", osc.posture_stiffness, 0.0, 1e4)?;
     within("osc.singularity_damping", osc.singularity_damping, 0.0, 1.0)?;
+    within("osc.singularity_onset", osc.singularity_onset, 0.0, 1.0)?;
     positive("osc.max_position_error", osc.max_position_error)?;
     positive("osc.max_rotation_error", osc.max_rotation_error)
 }
