@@ -127,13 +127,18 @@ pub struct Scene {
 impl Scene {
     /// Compiles the scene. Fails if the simulator refuses the model.
     pub fn new(config: &SceneConfig, robots: Vec<RobotModel>, item: CatalogueItem) -> Result<Self, Error> {
+        if robots.len() != item.object.parts.len() {
+            return Err(Error::ArmCount { arms: robots.len(), parts: item.object.parts.len(), object: item.object.name });
+        }
+        Self::compile(config, robots, item)
+    }
+
+    /// The same with any number of arms, none among them: for what needs no grasps.
+    pub(crate) fn compile(config: &SceneConfig, robots: Vec<RobotModel>, item: CatalogueItem) -> Result<Self, Error> {
         let hold_fingers = hold_fingers(&item);
         let hold_centers = hold_fingers.iter().map(|[a, b]| nalgebra::center(a, b)).collect();
         let CatalogueItem { object, demonstrations } = item;
         let graph = ObjectGraph::of(&object).map_err(|cause| Error::Object { name: object.name.clone(), cause })?;
-        if robots.len() != object.parts.len() {
-            return Err(Error::ArmCount { arms: robots.len(), parts: object.parts.len(), object: object.name });
-        }
         let world_from_bases = base_poses(config, robots.len());
         let mjcf = mjcf::scene(config, &robots, &world_from_bases, &object);
         let model = MjModel::from_xml_string(&mjcf).map_err(|cause| Error::Model { cause: cause.to_string() })?;
