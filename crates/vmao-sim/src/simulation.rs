@@ -87,7 +87,7 @@ impl<'s> Simulation<'s> {
         for arm in 0..self.scene.arms.len() {
             let state = self.arm_state(arm);
             let index = &self.scene.arms[arm];
-            let torque = torques(&self.gains, &state, &self.goals[arm], &index.max_torque);
+            let torque = torques(&self.gains, &state, &self.goals[arm], &index.limits);
             let drive = self.grip_force(arm);
             let ctrl = self.data.ctrl_mut();
             ctrl[index.ctrl..index.ctrl + 7].copy_from_slice(torque.as_slice());

@@ -9,7 +9,7 @@ use vmao_core::object_centric::part_poses;
 
 /// The object alone on the table.
 fn alone(name: &str, set: InstanceSet, instance: u16) -> Scene {
-    Scene::compile(&configuration().0, Vec::new(), item(name, set, instance).unwrap()).unwrap()
+    Scene::without_arms(&configuration().0, item(name, set, instance).unwrap()).unwrap()
 }
 
 /// Everything that lies deeper than a millimetre in something else.
