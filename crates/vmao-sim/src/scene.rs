@@ -122,15 +122,30 @@ pub struct Scene {
 impl Scene {
     /// Compiles the scene. Fails if the arms are fewer than the parts or cannot be placed, or the simulator refuses the model.
     pub fn new(config: &SceneConfig, robots: Vec<RobotModel>, item: CatalogueItem) -> Result<Self, Error> {
+        if robots.len() < item.object.parts.len() {
+            return Err(Error::ArmCount { arms: robots.len(), parts: item.object.parts.len(), object: item.object.name });
+        }
+        let spacing = Spacing { distance: config.base_distance, between: config.base_spacing };
+        let world_from_bases = base_poses(config.layout, spacing, &config.bases, &robots)?;
+        Self::compile(config, robots, world_from_bases, item)
+    }
+
+    /// The object alone on the table: for what needs no arms.
+    #[cfg(test)]
+    pub(crate) fn without_arms(config: &SceneConfig, item: CatalogueItem) -> Result<Self, Error> {
+        Self::compile(config, Vec::new(), Vec::new(), item)
+    }
+
+    fn compile(
+        config: &SceneConfig,
+        robots: Vec<RobotModel>,
+        world_from_bases: Vec<Pose>,
+        item: CatalogueItem,
+    ) -> Result<Self, Error> {
         let hold_fingers = hold_fingers(&item);
         let hold_centers = hold_fingers.iter().map(|[a, b]| nalgebra::center(a, b)).collect();
         let CatalogueItem { object, demonstrations } = item;
         let graph = ObjectGraph::of(&object).map_err(|cause| Error::Object { name: object.name.clone(), cause })?;
-        if robots.len() < object.parts.len() {
-            return Err(Error::ArmCount { arms: robots.len(), parts: object.parts.len(), object: object.name });
-        }
-        let spacing = Spacing { distance: config.base_distance, between: config.base_spacing };
-        let world_from_bases = base_poses(config.layout, spacing, &config.bases, &robots)?;
         let mjcf = mjcf::scene(config, &robots, &world_from_bases, &object);
         let model = MjModel::from_xml_string(&mjcf).map_err(|cause| Error::Model { cause: cause.to_string() })?;
         let arms = robots.iter().enumerate().map(|(arm, robot)| arm_index(&model, arm, robot)).collect::<Result<Vec<_>, _>>()?;
