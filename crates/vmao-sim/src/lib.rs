@@ -19,6 +19,7 @@ mod layout;
 mod measures;
 mod mjcf;
 mod planning_world;
+pub mod profile;
 mod recorder;
 mod scene;
 mod simulation;
