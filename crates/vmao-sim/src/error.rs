@@ -18,6 +18,12 @@ pub enum Error {
         /// What is wrong with it.
         cause: vmao_core::object_graph::GraphError,
     },
+    /// The robots cannot be shown with these meshes.
+    #[error("meshes: {cause}")]
+    Meshes {
+        /// What was found and what was expected, or the simulator's words.
+        cause: String,
+    },
     /// The arms cannot be placed so.
     #[error("placement of the arms: {cause}")]
     Placement {

@@ -1,12 +1,13 @@
 //! Writes the scene as MJCF: the exact model that trials run on, loadable by MuJoCo alone.
 
 use crate::convention::{inertial_element, pose_attributes, shape_attributes};
+use crate::link_meshes::{self, Dress, LinkMesh};
 use crate::scene::SceneConfig;
 use std::fmt::Write;
 use vmao_core::contact::PartId;
 use vmao_core::geometry::Pose;
 use vmao_core::object::{ArticulatedObject, Joint, JointKind};
-use vmao_core::robots::{Finger, Link, RobotModel};
+use vmao_core::robots::{Gripper, Link, RobotModel};
 use vmao_core::shape::Solid;
 
 /// Name of the body of an object part.
@@ -20,9 +21,16 @@ pub(crate) fn arm_name(arm: usize, name: &str) -> String {
 }
 
 /// The whole scene. Collision: everything meets everything, except neighbouring links of one arm and joined parts.
-pub(crate) fn scene(config: &SceneConfig, robots: &[RobotModel], bases: &[Pose], object: &ArticulatedObject) -> String {
+pub(crate) fn scene(
+    config: &SceneConfig,
+    robots: &[RobotModel],
+    bases: &[Pose],
+    object: &ArticulatedObject,
+    meshes: &[LinkMesh],
+) -> String {
     let mut xml = String::new();
     header(&mut xml, config);
+    xml.push_str(&link_meshes::assets(meshes));
     line(&mut xml, "<worldbody>");
     line(&mut xml, r#"<light pos="0 0 2.5" dir="0 0 -1" diffuse="0.7 0.7 0.7"/>"#);
     line(
@@ -33,7 +41,7 @@ pub(crate) fn scene(config: &SceneConfig, robots: &[RobotModel], bases: &[Pose],
         ),
     );
     for (arm, (robot, base)) in robots.iter().zip(bases).enumerate() {
-        arm_body(&mut xml, config, arm, robot, base);
+        arm_body(&mut xml, config, arm, robot, base, &Dress::of(robot.name, meshes));
     }
     part_body(&mut xml, config, object, PartId(0), None);
     line(&mut xml, "</worldbody>");
@@ -75,17 +83,19 @@ fn solid_geom(xml: &mut String, name: &str, solid: &Solid, extra: &str) {
     );
 }
 
-fn link_content(xml: &mut String, arm: usize, link: &Link, friction: &str) {
+fn link_content(xml: &mut String, arm: usize, link: &Link, friction: &str, dress: &Dress<'_>) {
     line(xml, &inertial_element(&link.inertial));
+    let extra = format!(r#"mass="0" friction="{friction}"{}"#, dress.solid_group(link.name));
     for (index, solid) in link.solids.iter().enumerate() {
-        solid_geom(xml, &arm_name(arm, &format!("{}/{index}", link.name)), solid, &format!(r#"mass="0" friction="{friction}""#));
+        solid_geom(xml, &arm_name(arm, &format!("{}/{index}", link.name)), solid, &extra);
     }
+    xml.push_str(&dress.geoms(link.name));
 }
 
-fn arm_body(xml: &mut String, config: &SceneConfig, arm: usize, robot: &RobotModel, base: &Pose) {
+fn arm_body(xml: &mut String, config: &SceneConfig, arm: usize, robot: &RobotModel, base: &Pose, dress: &Dress<'_>) {
     let friction = config.link_friction.mjcf();
     line(xml, &format!(r#"<body name="{}" {}>"#, arm_name(arm, robot.base.name), pose_attributes(base)));
-    link_content(xml, arm, &robot.base, &friction);
+    link_content(xml, arm, &robot.base, &friction, dress);
     for (index, joint) in robot.joints.iter().enumerate() {
         line(xml, &format!(r#"<body name="{}" {}>"#, arm_name(arm, joint.link.name), pose_attributes(&joint.parent_from_joint)));
         let [low, high] = joint.range;
@@ -98,21 +108,22 @@ fn arm_body(xml: &mut String, config: &SceneConfig, arm: usize, robot: &RobotMod
                 joint.armature
             ),
         );
-        link_content(xml, arm, &joint.link, &friction);
+        link_content(xml, arm, &joint.link, &friction, dress);
     }
     let gripper = &robot.gripper;
     line(xml, &format!(r#"<body name="{}" {}>"#, arm_name(arm, gripper.hand.name), pose_attributes(&gripper.last_from_hand)));
-    link_content(xml, arm, &gripper.hand, &friction);
+    link_content(xml, arm, &gripper.hand, &friction, dress);
     line(xml, &format!(r#"<site name="{}" {} size="0.004"/>"#, arm_name(arm, "tool"), pose_attributes(&gripper.hand_from_tool)));
-    for (index, finger) in gripper.fingers.iter().enumerate() {
-        finger_body(xml, config, arm, index, finger, gripper.travel);
+    for index in 0..gripper.fingers.len() {
+        finger_body(xml, config, arm, index, gripper, dress);
     }
     for _ in 0..robot.joints.len() + 2 {
         line(xml, "</body>");
     }
 }
 
-fn finger_body(xml: &mut String, config: &SceneConfig, arm: usize, index: usize, finger: &Finger, travel: f64) {
+fn finger_body(xml: &mut String, config: &SceneConfig, arm: usize, index: usize, gripper: &Gripper, dress: &Dress<'_>) {
+    let (finger, travel) = (&gripper.fingers[index], gripper.travel);
     line(xml, &format!(r#"<body name="{}" {}>"#, arm_name(arm, finger.link.name), pose_attributes(&finger.hand_from_finger)));
     line(
         xml,
@@ -121,8 +132,8 @@ fn finger_body(xml: &mut String, config: &SceneConfig, arm: usize, index: usize,
             arm_name(arm, &format!("finger{}", index + 1))
         ),
     );
-    link_content(xml, arm, &finger.link, &config.link_friction.mjcf());
-    let pad = format!(r#"mass="0" friction="{}""#, config.pad_friction.mjcf());
+    link_content(xml, arm, &finger.link, &config.link_friction.mjcf(), dress);
+    let pad = format!(r#"mass="0" friction="{}"{}"#, config.pad_friction.mjcf(), dress.solid_group(finger.link.name));
     solid_geom(xml, &arm_name(arm, &format!("pad{}", index + 1)), &finger.pad, &pad);
     line(xml, "</body>");
 }

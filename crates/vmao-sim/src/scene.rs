@@ -146,7 +146,7 @@ impl Scene {
         let hold_centers = hold_fingers.iter().map(|[a, b]| nalgebra::center(a, b)).collect();
         let CatalogueItem { object, demonstrations } = item;
         let graph = ObjectGraph::of(&object).map_err(|cause| Error::Object { name: object.name.clone(), cause })?;
-        let mjcf = mjcf::scene(config, &robots, &world_from_bases, &object);
+        let mjcf = mjcf::scene(config, &robots, &world_from_bases, &object, &[]);
         let model = MjModel::from_xml_string(&mjcf).map_err(|cause| Error::Model { cause: cause.to_string() })?;
         let arms = robots.iter().enumerate().map(|(arm, robot)| arm_index(&model, arm, robot)).collect::<Result<Vec<_>, _>>()?;
         let part_bodies = object

@@ -18,6 +18,7 @@ pub mod output;
 pub mod provenance;
 pub mod report;
 pub mod results;
+pub mod robot_meshes;
 pub mod run_report;
 pub mod scenes;
 pub mod wording;

@@ -42,6 +42,9 @@ fn bad_usage_and_bad_input_exit_with_two_and_say_what_exists() {
         &["ocao", "a.json", "--out", "o", "--config", "bad.toml"],
         "bad.toml: line 2, column 1: section [goal] has no key `lfit`",
     );
+    check_refused(&["robot", "meshes", "ur5", "--from", "."], "the program has no robot `ur5`; robots are: panda, sawyer");
+    check_refused(&["robot", "meshes", "panda", "--from", ".", "--out", "o"], "no model of `panda` with meshes below ");
+    check_refused(&["scene", "--meshes", "none", "--out", "a.xml"], "error: none/meshes.json: cannot be read: ");
     check_refused(&["ocao", "a.json", "--config", "none.toml"], "none.toml: cannot be read: ");
 }
 

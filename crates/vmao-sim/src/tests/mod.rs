@@ -5,6 +5,7 @@ mod catalogue;
 mod control;
 mod internal_forces;
 mod kinematics;
+mod link_meshes;
 #[path = "../../tests/support/mod.rs"]
 mod support;
 mod witness;

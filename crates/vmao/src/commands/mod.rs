@@ -9,6 +9,7 @@ mod explore;
 mod object;
 mod ocao;
 mod report;
+mod robot;
 mod scene;
 mod session;
 mod train;
@@ -46,6 +47,8 @@ enum Command {
     Evaluate(evaluate::EvaluateArguments),
     /// report.html of a run
     Report(report::ReportArguments),
+    /// Meshes of the robots, for pictures
+    Robot(robot::RobotArguments),
     /// The simulated scene as MJCF
     Scene(scene::SceneArguments),
     /// Goal poses of all parts and grippers from a root pose and joint positions (object-centric control)
@@ -92,6 +95,7 @@ fn execute(command: Command, command_line: &[String]) -> Result<(), Failure> {
         Command::Train(arguments) => train::run(&arguments, &session(&arguments.common)?),
         Command::Evaluate(arguments) => evaluate::run(&arguments, session(&arguments.common)?),
         Command::Report(arguments) => report::run(&arguments, &session(&arguments.common)?),
+        Command::Robot(arguments) => robot::run(&arguments, &session(arguments.action.common())?),
         Command::Scene(arguments) => scene::run(&arguments, &session(&arguments.common)?),
         Command::Ocao(arguments) => ocao::run(&arguments, &session(&arguments.common)?),
     }

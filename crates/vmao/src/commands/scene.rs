@@ -1,7 +1,12 @@
 //! `vmao scene --out FILE.xml`: the exact MJCF that the configured trials run on.
 
 use super::{CommonOptions, Session};
-use crate::{failure::Failure, output::write_whole, scenes::scenes};
+use crate::{
+    failure::{Failure, OrBadInput},
+    output::write_whole,
+    robot_meshes,
+    scenes::scenes,
+};
 use anyhow::Context;
 use serde_json::json;
 use std::{io::Write, path::PathBuf};
@@ -9,14 +14,26 @@ use vmao_core::catalogue::InstanceSet;
 
 #[derive(Debug, clap::Args)]
 pub(super) struct SceneArguments {
+    /// Show robots with these meshes, a folder that `vmao robot meshes` wrote; may be repeated
+    #[arg(long, value_name = "DIR")]
+    meshes: Vec<PathBuf>,
     #[command(flatten)]
     pub(super) common: CommonOptions,
 }
 
-pub(super) fn run(_arguments: &SceneArguments, session: &Session) -> Result<(), Failure> {
+pub(super) fn run(arguments: &SceneArguments, session: &Session) -> Result<(), Failure> {
     let path = session.out.clone().unwrap_or_else(|| PathBuf::from("scene.xml"));
     let scenes = scenes(&session.config, InstanceSet::Train)?;
     let scene = scenes.first().ok_or_else(|| Failure::bad_input("the object has no sizes"))?;
-    write_whole(&path, |file| file.write_all(scene.mjcf.as_bytes())).with_context(|| path.display().to_string())?;
+    let mut meshes = Vec::new();
+    for folder in &arguments.meshes {
+        meshes.extend(robot_meshes::read(folder).or_bad_input()?);
+    }
+    let mjcf = if meshes.is_empty() {
+        scene.mjcf.clone()
+    } else {
+        scene.mjcf_with_meshes(&session.config.scene, &meshes).or_bad_input()?
+    };
+    write_whole(&path, |file| file.write_all(mjcf.as_bytes())).with_context(|| path.display().to_string())?;
     session.print(&json!({ "scene": path }))
 }
