@@ -1,5 +1,6 @@
 //! Inverse kinematics inside the joint limits: damped least squares from stored, given and random starts.
 
+mod pieces;
 mod prepared;
 mod reach;
 mod self_motion;

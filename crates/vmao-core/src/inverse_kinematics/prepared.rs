@@ -2,8 +2,9 @@
 
 use super::{
     IkOutcome, IkSettings, outcome,
+    pieces::{Piece, pieces},
     reach::ReachBound,
-    self_motion::{Curve, distance},
+    self_motion::{STRIDE, SelfMotion, distance},
     stored::StoredStarts,
 };
 use crate::{
@@ -12,7 +13,6 @@ use crate::{
     kinematics::SerialChain,
     random::Stream,
 };
-use std::f64::consts::TAU;
 
 /// Stored starts tried from the pose's own cell of the table.
 const FIRST_STARTS: usize = 12;
@@ -20,15 +20,17 @@ const FIRST_STARTS: usize = 12;
 const FEW_ITERATIONS: usize = 20;
 /// A seed whose tool is at most this far from the pose (m and rad together) goes before the stored starts.
 const NEAR: f64 = 0.3;
-/// Starts from which branches are looked for: stored ones, and random ones in the limits.
-const BRANCH_STARTS: [usize; 2] = [160, 40];
+/// Stored starts, each followed by a random one, from which curves of solutions are looked for at most.
+const CURVE_STARTS: usize = 300;
+/// Solutions in a row that lie on curves known before, after which no further curve is looked for.
+const ENOUGH: usize = 100;
 
 /// One branch of the solutions of a pose.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Branch {
     /// Its configuration nearest to the seed (rad).
     pub joint_positions: Vec<f64>,
-    /// Of a 7-joint chain, configurations along the whole branch at most 0.15 rad apart, each a solution (rad).
+    /// Of a 7-joint chain, solutions along the whole branch (rad), neighbours at most 0.15 apart, ends at most 0.03 from a limit.
     pub path: Vec<Vec<f64>>,
     /// Whether the path closes on itself; otherwise limits end it.
     pub closed: bool,
@@ -104,74 +106,77 @@ impl InverseKinematics {
     /// Like [`Self::solve`], but the solution nearest to `seed` (least Σ (qᵢ − seedᵢ)²) of all [`Self::branches`].
     pub fn nearest(&self, base_from_tool: &Pose, seed: &[f64]) -> IkOutcome {
         let (goal, joints) = (Goal::new(base_from_tool), self.solver.joints(seed));
-        let Some(first) = self.curves(&goal, &joints).into_iter().next() else { return self.solve(base_from_tool, seed) };
-        self.verdict(&goal, &Attempt { q: first.0, error: self.solver.evaluate(&goal, &first.0).0, solved: true })
+        let gaps: Vec<(Joints, f64)> = self.pieces(&goal, &joints).iter().map(|piece| piece.nearest(&joints)).collect();
+        let least = gaps.iter().map(|gap| gap.1).fold(f64::INFINITY, f64::min);
+        // a polyline can be nearer or further than its curve, by less than a stride
+        let close = gaps.iter().filter(|gap| gap.1 <= least + STRIDE);
+        let exact = close.filter_map(|(near, _)| self.solver.approach(&goal, near, &joints));
+        match exact.min_by(|a, b| distance(a, &joints).total_cmp(&distance(b, &joints))) {
+            Some(q) => self.verdict(&goal, &Attempt { q, error: self.solver.evaluate(&goal, &q).0, solved: true }),
+            None => self.solve(base_from_tool, seed),
+        }
     }
 
     /// All branches found of the solutions of a pose, the nearest to `seed` first; none if it was not reached.
     ///
-    /// The solutions of a 7-joint arm form curves, cut to pieces by the limits; a branch is a piece. Pieces are looked for
-    /// from 200 starts, so that a short one can be missed. With another number of joints every solution found that
-    /// differs from the others is a branch of its own.
+    /// The solutions of a 7-joint arm form closed curves, which the limits cut to pieces; a branch is a piece. A curve is
+    /// followed to its end, so that one solution on it leads to all its pieces; curves are looked for until 100 solutions
+    /// in a row lie on known ones. A curve that few starts lead to can be missed, and where two curves nearly touch, branches
+    /// can overlap. With another number of joints every
+    /// solution found that differs from the others is a branch of its own.
     pub fn branches(&self, base_from_tool: &Pose, seed: &[f64]) -> Vec<Branch> {
         let (goal, seed) = (Goal::new(base_from_tool), self.solver.joints(seed));
         let count = self.solver.count();
-        let branch = |(q, curve): (Joints, Curve)| Branch {
-            joint_positions: q[..count].to_vec(),
-            path: curve.points.iter().map(|point| point[..count].to_vec()).collect(),
-            closed: curve.closed,
+        let nearest = |piece: Piece| {
+            // a point alone would slide over the surface that it lies on to the one place nearest to the seed
+            let slid = (piece.points.len() > 1).then(|| self.solver.approach(&goal, &piece.nearest(&seed).0, &seed)).flatten();
+            (slid.unwrap_or(piece.points[0]), piece)
         };
-        self.curves(&goal, &seed).into_iter().map(branch).collect()
+        let mut found: Vec<(Joints, Piece)> = self.pieces(&goal, &seed).into_iter().map(nearest).collect();
+        found.sort_by(|a, b| distance(&a.0, &seed).total_cmp(&distance(&b.0, &seed)));
+        let branch = |(q, piece): (Joints, Piece)| Branch {
+            joint_positions: q[..count].to_vec(),
+            path: piece.points.iter().map(|point| point[..count].to_vec()).collect(),
+            closed: piece.closed,
+        };
+        found.into_iter().map(branch).collect()
     }
 
-    /// The branches with their points nearest to `seed`, the nearest first.
-    fn curves(&self, goal: &Goal, seed: &Joints) -> Vec<(Joints, Curve)> {
+    /// All pieces of the curves of solutions that were found.
+    fn pieces(&self, goal: &Goal, seed: &Joints) -> Vec<Piece> {
         let error = self.solver.evaluate(goal, seed).0;
         if !error.iter().all(|x| x.is_finite()) || self.excluded(goal) {
             return Vec::new();
         }
-        let mut curves: Vec<Curve> = Vec::new();
-        let stored = self.stored.around(&self.solver, goal, BRANCH_STARTS[0]);
-        let starts = [*seed].into_iter().chain(stored).chain(self.random_starts().take(BRANCH_STARTS[1]));
+        let (mut curves, mut found): (Vec<SelfMotion>, Vec<Piece>) = (Vec::new(), Vec::new());
+        let mut stored = self.stored.around(&self.solver, goal, CURVE_STARTS).into_iter();
+        let mixed = self.random_starts().take(CURVE_STARTS).flat_map(|random| stored.next().into_iter().chain([random]));
+        let starts = [*seed].into_iter().chain(mixed);
+        let mut unchanged = 0;
         for start in starts {
-            let attempt = self.solver.descend(goal, start, self.solver.settings.max_iterations);
-            if attempt.solved {
-                self.collect(goal, attempt.q, &mut curves);
+            if unchanged == ENOUGH {
+                break;
             }
-        }
-        let mut found = Vec::with_capacity(curves.len());
-        for curve in curves {
-            let near = curve.nearest(seed).0;
-            let q = self.solver.approach(goal, &near, seed).unwrap_or(curve.points[0]);
-            found.push((q, curve));
-        }
-        found.sort_by(|a, b| distance(&a.0, seed).total_cmp(&distance(&b.0, seed)));
-        found
-    }
-
-    /// Adds the branch through the solution `q` unless it is known, and those that differ from it by whole turns of joints.
-    fn collect(&self, goal: &Goal, q: Joints, curves: &mut Vec<Curve>) {
-        let mut open = vec![q];
-        while let Some(q) = open.pop() {
-            if curves.iter().any(|curve| curve.holds(&q)) {
+            let Attempt { q, solved, .. } = self.solver.descend(goal, start, self.solver.settings.max_iterations);
+            if !solved {
                 continue;
             }
-            let curve = self.solver.trace(goal, &q);
-            for (i, limits) in self.solver.joints.iter().enumerate().filter(|(_, limits)| limits.upper - limits.lower >= TAU) {
-                for turn in [-TAU, TAU] {
-                    let inside = |q: &Joints| (limits.lower..=limits.upper).contains(&(q[i] + turn));
-                    // one point of each stretch that the turn leaves inside the limits
-                    let begins = (0..curve.points.len())
-                        .filter(|&at| inside(&curve.points[at]) && (at == 0 || !inside(&curve.points[at - 1])));
-                    open.extend(begins.map(|at| {
-                        let mut turned = curve.points[at];
-                        turned[i] += turn;
-                        turned
-                    }));
+            unchanged += 1;
+            if !curves.iter().any(|curve| curve.holds(&q)) {
+                unchanged = 0;
+                let mut curve = self.solver.trace(goal, &q);
+                if curve.closure.is_none() {
+                    // a walk that stuck at a singular place before is now taken from its other side
+                    curve.points.retain(|point| !curves.iter().any(|known| known.holds(point)));
                 }
+                found.extend(pieces(&curve, &self.solver.joints));
+                curves.push(curve);
+            } else if !found.iter().any(|piece| piece.passes(&q)) {
+                // so short a piece that the trace stepped over it
+                found.push(Piece { points: vec![q], closed: false });
             }
-            curves.push(curve);
         }
+        found
     }
 
     /// Descends from `start` and keeps what is better than `best`; whether the pose is reached.

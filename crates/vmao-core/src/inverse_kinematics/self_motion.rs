@@ -1,53 +1,62 @@
 //! The configurations of one pose: curves along which a 7-joint arm moves while its tool stands still.
 //!
-//! Inside the limits they fall into pieces, and a piece is a branch. A branch is traced from one of its points both ways,
-//! predictor along the null space and Newton's corrector, until a limit stops it or it closes.
+//! Without limits the curves are closed. A curve is traced from one of its points, predictor along the null space and
+//! Newton's corrector, until it comes back, each joint by a whole number of turns. `pieces.rs` cuts it at the limits.
 
 use crate::damped_least_squares::{Goal, Joints, MAX_JOINTS, Solver};
 use nalgebra::{Cholesky, Const, Matrix6, Vector6};
+use std::f64::consts::TAU;
 
-/// Longest distance between neighbouring points of a branch (rad, over all joints).
+/// Longest distance between neighbouring points of a curve (rad, over all joints).
 pub(super) const STRIDE: f64 = 0.1;
-/// Shortest stride, at a sharp bend or before a limit (rad).
+/// The same where a limit is nearer than [`STRIDE`].
+const STRIDE_AT_LIMIT: f64 = 0.02;
+/// Shortest stride, at a sharp bend (rad).
 const SHORTEST: f64 = 1e-4;
 /// Cosine of the greatest turn between neighbouring tangents.
 const STRAIGHT: f64 = 0.94;
-/// A configuration nearer than this to a traced branch lies on it (rad).
+/// A configuration nearer than this to a traced curve lies on it (rad).
 const SAME: f64 = 0.02;
-/// Points of a branch at most; the longest seen have a few hundred.
+/// Every so manieth point is looked out for, so that a walk in circles ends.
+const ANCHOR_SPACING: usize = 16;
+/// Points of a curve at most; the longest seen have some hundred.
 const MOST_POINTS: usize = 5000;
 
 type Factor = Cholesky<f64, Const<6>>;
 type Columns = [Vector6<f64>; MAX_JOINTS];
 
-/// One piece of the set of solutions, from end to end.
+/// All configurations that the arm can move to from one, if it had no limits.
 #[derive(Debug, Clone)]
-pub(super) struct Curve {
+pub(super) struct SelfMotion {
     pub(super) points: Vec<Joints>,
-    pub(super) closed: bool,
+    /// From the first point to where the curve comes back to it, whole turns; none if it was not traced to its end.
+    pub(super) closure: Option<Joints>,
 }
 
-impl Curve {
-    /// The point of the polyline nearest to `q`, and its distance (rad, over all joints).
-    pub(super) fn nearest(&self, q: &Joints) -> (Joints, f64) {
-        let mut best = (self.points[0], distance(&self.points[0], q));
-        let pairs = self.points.windows(2).map(|pair| (&pair[0], &pair[1]));
-        let closing = self.closed.then(|| (&self.points[self.points.len() - 1], &self.points[0]));
-        for (a, b) in pairs.chain(closing) {
-            let along: Joints = std::array::from_fn(|i| b[i] - a[i]);
-            let share = (dot(&along, &std::array::from_fn(|i| q[i] - a[i])) / dot(&along, &along).max(1e-30)).clamp(0.0, 1.0);
-            let point = std::array::from_fn(|i| a[i] + share * along[i]);
-            let gap = distance(&point, q);
-            if gap < best.1 {
-                best = (point, gap);
-            }
-        }
-        best
-    }
-
+impl SelfMotion {
+    /// Whether `q` lies on the curve but for whole turns of its joints.
     pub(super) fn holds(&self, q: &Joints) -> bool {
-        self.nearest(q).1 < SAME
+        let beside = |point: &Joints| -> Joints { std::array::from_fn(|i| turned_near(q[i], point[i])) };
+        let near = |point: &Joints| point.iter().zip(q).all(|(a, &b)| (turned_near(b, *a) - a).abs() < STRIDE + SAME);
+        let last = self.closure.map(|closure| std::array::from_fn(|i| self.points[0][i] + closure[i]));
+        let ends = self.points[1..].iter().chain(&last);
+        self.points.iter().zip(ends).any(|(a, b)| near(a) && distance(&foot(a, b, &beside(a)), &beside(a)) < SAME)
+            || self.points.iter().any(|point| near(point) && distance(point, &beside(point)) < SAME)
     }
+}
+
+/// The angle that differs from `angle` by whole turns and is nearest to `other`.
+fn turned_near(angle: f64, other: f64) -> f64 {
+    let turns = (other - angle) / TAU;
+    // `round` is a call where the processor's baseline has no instruction for it
+    angle + TAU * f64::from((turns + 0.5_f64.copysign(turns)) as i32)
+}
+
+/// The point of the segment from `a` to `b` nearest to `q`.
+pub(super) fn foot(a: &Joints, b: &Joints, q: &Joints) -> Joints {
+    let along: Joints = std::array::from_fn(|i| b[i] - a[i]);
+    let share = (dot(&along, &std::array::from_fn(|i| q[i] - a[i])) / dot(&along, &along).max(1e-30)).clamp(0.0, 1.0);
+    std::array::from_fn(|i| a[i] + share * along[i])
 }
 
 fn dot(a: &Joints, b: &Joints) -> f64 {
@@ -60,65 +69,80 @@ pub(super) fn distance(a: &Joints, b: &Joints) -> f64 {
 }
 
 impl Solver {
-    /// The branch through the solution `q`. Of a chain that has not 7 joints, `q` alone: a point or part of a surface.
-    pub(super) fn trace(&self, goal: &Goal, q: &Joints) -> Curve {
-        let alone = Curve { points: vec![*q], closed: false };
-        if self.count() != 7 {
-            return alone;
-        }
-        let Some(tangent) = self.tangent(goal, q) else { return alone };
-        let (forward, closed) = self.walk(goal, q, &tangent);
-        let mut points = Vec::new();
-        if !closed {
+    /// The curve through the solution `q`. Of a chain that has not 7 joints, `q` alone: a point, or part of a surface.
+    pub(super) fn trace(&self, goal: &Goal, q: &Joints) -> SelfMotion {
+        let tangent = if self.count() == 7 { self.tangent(goal, q) } else { None };
+        let Some(tangent) = tangent else { return SelfMotion { points: vec![*q], closure: None } };
+        let (forward, closure) = self.walk(goal, q, &tangent);
+        let mut points = vec![*q];
+        if closure.is_none() {
             points = self.walk(goal, q, &tangent.map(|t| -t)).0;
             points.reverse();
+            points.push(*q);
         }
-        points.push(*q);
         points.extend(forward);
-        Curve { points, closed }
+        SelfMotion { points, closure }
     }
 
-    /// The points after `start` in one direction, and whether the walk came back to it.
-    fn walk(&self, goal: &Goal, start: &Joints, direction: &Joints) -> (Vec<Joints>, bool) {
-        let (mut q, mut tangent, mut stride) = (*start, *direction, STRIDE);
+    /// The points after `start` in one direction, and how far all turned when the curve came back, if it did.
+    fn walk(&self, goal: &Goal, start: &Joints, direction: &Joints) -> (Vec<Joints>, Option<Joints>) {
+        let (mut q, mut tangent, mut stride, mut walked) = (*start, *direction, STRIDE, 0.0);
+        let mut anchors = vec![(*start, *direction, 0.0)];
         let mut points: Vec<Joints> = Vec::new();
         while points.len() < MOST_POINTS && stride >= SHORTEST {
+            stride = stride.min(self.longest_stride(&q));
             let ahead = std::array::from_fn(|i| q[i] + stride * tangent[i]);
-            let Some((next, along)) = self.correct(goal, &ahead, &tangent) else {
+            let landed = self.correct(goal, &ahead, &tangent);
+            let straight = |(next, along): &(Joints, Joints)| {
+                dot(along, &tangent) > STRAIGHT && (0.5 * stride..1.5 * stride).contains(&distance(next, &q))
+            };
+            let Some((next, along)) = landed.filter(straight) else {
                 stride /= 2.0;
                 continue;
             };
-            let moved = distance(&next, &q);
-            if dot(&along, &tangent) < STRAIGHT || moved > 1.5 * stride || moved < 0.5 * stride {
-                stride /= 2.0;
-                continue;
+            walked += stride;
+            let returns = |(anchor, heading, passed): &(Joints, Joints, f64)| {
+                let back: Joints = std::array::from_fn(|i| turned_near(anchor[i], next[i]));
+                let here = walked - passed > 1.5 * STRIDE
+                    && dot(&along, heading) > 0.0
+                    && distance(&foot(&q, &next, &back), &back) < SAME;
+                here.then_some(back)
+            };
+            if let Some((index, back)) = anchors.iter().enumerate().find_map(|(index, anchor)| Some((index, returns(anchor)?))) {
+                if index == 0 {
+                    return (points, Some(std::array::from_fn(|i| back[i] - start[i])));
+                }
+                // Back anywhere but at the start, the walk has slipped to a neighbouring curve at a nearly singular place,
+                // and has followed a stretch before the anchor twice.
+                let known = points[..ANCHOR_SPACING * index].to_vec();
+                let twice =
+                    |point: &Joints| known.windows(2).any(|pair| distance(&foot(&pair[0], &pair[1], point), point) < SAME);
+                while points.len() > known.len() && points.last().is_some_and(twice) {
+                    points.pop();
+                }
+                return (points, None);
             }
-            if let Some(share) = self.share_inside(&q, &next) {
-                // up to just before the limit; a second try there is too short to go on
-                stride *= 0.95 * share;
-                continue;
-            }
-            if points.len() > 2 && distance(&next, start) < 0.75 * stride && dot(&along, direction) > 0.5 {
-                return (points, true);
+            if points.len() % ANCHOR_SPACING == ANCHOR_SPACING - 1 {
+                anchors.push((next, along, walked));
             }
             (q, tangent) = (next, along);
             points.push(q);
-            stride = (stride * 1.5).min(STRIDE);
+            stride *= 1.5;
         }
-        (points, false)
+        (points, None)
     }
 
-    /// How much of the way from `q` to `next` lies inside the limits; none if all of it.
-    fn share_inside(&self, q: &Joints, next: &Joints) -> Option<f64> {
-        let mut least = None;
-        for (i, limits) in self.joints.iter().enumerate() {
-            let limit = next[i].clamp(limits.lower, limits.upper);
-            if limit != next[i] {
-                let share = ((limit - q[i]) / (next[i] - q[i])).clamp(0.0, 1.0);
-                least = Some(least.unwrap_or(1.0_f64).min(share));
+    /// Short where the curve may pass a limit, so that no piece of it is stepped over.
+    fn longest_stride(&self, q: &Joints) -> f64 {
+        let mut at_limit = false;
+        for (limits, &angle) in self.joints.iter().zip(q) {
+            let middle = (limits.lower + limits.upper) / 2.0;
+            if (turned_near(angle, middle) - middle).abs() > (limits.upper - limits.lower) / 2.0 + STRIDE {
+                return STRIDE;
             }
+            at_limit |= [limits.lower, limits.upper].iter().any(|limit| (turned_near(angle, *limit) - limit).abs() < STRIDE);
         }
-        least
+        if at_limit { STRIDE_AT_LIMIT } else { STRIDE }
     }
 
     /// Newton's method from `q` without regard to the limits, to the solution and its tangent, which looks along `before`.
