@@ -7,8 +7,9 @@ use crate::{
     geometry::{Pose, rotation_log},
     inverse_kinematics::{IkSettings, cost},
     kinematics::{ChainJoint, SerialChain},
+    small_systems::{NormalEquations, sines_cosines},
 };
-use nalgebra::{Matrix3, Matrix6, Rotation3, UnitQuaternion, Vector3, Vector6};
+use nalgebra::{Matrix3, Rotation3, UnitQuaternion, Vector3, Vector6};
 
 /// Most joints of a chain that inverse kinematics solves; fixed so that the iteration does not allocate.
 pub(crate) const MAX_JOINTS: usize = 8;
@@ -18,6 +19,8 @@ pub(crate) type Joints = [f64; MAX_JOINTS];
 
 /// Share of the half range from the middle of the limits at which a joint begins to feel them.
 pub(crate) const LIMIT_ZONE: f64 = 0.8;
+/// Share of the squared error in the damping.
+const DAMPING: f64 = 0.1;
 /// Constant part of the damping (m², rad²): small against the error's own share until it is nearly gone.
 const LEAST_DAMPING: f64 = 1e-8;
 /// Longest step of one joint in one iteration (rad): beyond it the linear model says nothing.
@@ -34,6 +37,10 @@ pub(crate) struct Goal {
 impl Goal {
     pub(crate) fn new(pose: &Pose) -> Self {
         Self { position: pose.translation.vector, rotation: *pose.rotation.to_rotation_matrix().matrix() }
+    }
+
+    pub(crate) fn is_finite(&self) -> bool {
+        self.position.iter().chain(self.rotation.iter()).all(|x| x.is_finite())
     }
 }
 
@@ -94,11 +101,12 @@ impl Solver {
         let mut rotation = Matrix3::identity();
         let mut position = Vector3::zeros();
         let (mut axes, mut origins) = ([Vector3::zeros(); MAX_JOINTS], [Vector3::zeros(); MAX_JOINTS]);
+        let (sines, cosines) = sines_cosines(q);
         for i in 0..self.count() {
             position += rotation * self.fixed[i].1;
             rotation *= self.fixed[i].0;
             (axes[i], origins[i]) = (rotation.column(2).into_owned(), position);
-            let (sine, cosine) = q[i].sin_cos();
+            let (sine, cosine) = (sines[i], cosines[i]);
             let (x, y) = (rotation.column(0).into_owned(), rotation.column(1).into_owned());
             rotation.set_column(0, &(x * cosine + y * sine));
             rotation.set_column(1, &(y * cosine - x * sine));
@@ -106,6 +114,12 @@ impl Solver {
         position += rotation * self.fixed[self.count()].1;
         rotation *= self.fixed[self.count()].0;
         Placed { rotation, position, axes, origins }
+    }
+
+    /// The pose that `q` reaches.
+    pub(crate) fn tool(&self, q: &Joints) -> Goal {
+        let Placed { rotation, position, .. } = self.place(q);
+        Goal { position, rotation }
     }
 
     /// Rotation and origin of the last link.
@@ -122,8 +136,7 @@ impl Solver {
             let linear = axes[i].cross(&(position - origins[i]));
             columns[i] = Vector6::new(linear.x, linear.y, linear.z, axes[i].x, axes[i].y, axes[i].z);
         }
-        let turn = Rotation3::from_matrix_unchecked(goal.rotation * rotation.transpose());
-        let (linear, angular) = (goal.position - position, rotation_log(&UnitQuaternion::from_rotation_matrix(&turn)));
+        let (linear, angular) = (goal.position - position, turn_between(&rotation, &goal.rotation));
         (Vector6::new(linear.x, linear.y, linear.z, angular.x, angular.y, angular.z), columns)
     }
 
@@ -134,18 +147,17 @@ impl Solver {
 
     /// The damped step Jᵀ(JJᵀ + λ)⁻¹(e − Jz) + z over the joints that their limits do not stop; z is the wish of the null space.
     pub(crate) fn step(&self, q: &Joints, error: &Vector6<f64>, columns: &[Vector6<f64>; MAX_JOINTS], wish: &Joints) -> Joints {
-        let damping = 0.5 * error.norm_squared() + LEAST_DAMPING;
+        let damping = DAMPING * error.norm_squared() + LEAST_DAMPING;
         let mut free = [true; MAX_JOINTS];
         let mut step = [0.0; MAX_JOINTS];
         for _ in 0..self.count() {
-            let mut normal = Matrix6::identity() * damping;
             let mut residual = *error;
             for i in (0..self.count()).filter(|&i| free[i]) {
-                normal.ger(1.0, &columns[i], &columns[i], 1.0);
                 residual -= columns[i] * wish[i];
             }
-            let Some(factor) = normal.cholesky() else { return [0.0; MAX_JOINTS] };
-            let weights = factor.solve(&residual);
+            let moving = (0..self.count()).filter(|&i| free[i]).map(|i| &columns[i]);
+            let Some(normal) = NormalEquations::new(moving, damping) else { return [0.0; MAX_JOINTS] };
+            let weights = normal.solve(&residual);
             let mut stopped = false;
             for (i, limits) in self.joints.iter().enumerate() {
                 step[i] = if free[i] { columns[i].dot(&weights) + wish[i] } else { 0.0 };
@@ -246,5 +258,46 @@ impl Solver {
         let (error, columns) = self.evaluate(goal, &q);
         q = self.advance(&q, &self.step(&q, &error, &columns, &wish));
         self.descend(goal, q, self.settings.max_iterations)
+    }
+}
+
+/// The rotation vector that turns the frame `from` to the frame `to`, in the frame that both are given in.
+fn turn_between(from: &Matrix3<f64>, to: &Matrix3<f64>) -> Vector3<f64> {
+    const NEARLY_HALF: f64 = -0.9;
+    // twice the sine times the axis, and twice the cosine plus one
+    let (mut axis, mut trace) = (Vector3::zeros(), 0.0);
+    for (a, b) in from.column_iter().zip(to.column_iter()) {
+        axis += a.cross(&b);
+        trace += a.dot(&b);
+    }
+    let (sine, cosine) = (axis.norm() / 2.0, (trace - 1.0) / 2.0);
+    if cosine < NEARLY_HALF {
+        let turn = Rotation3::from_matrix_unchecked(to * from.transpose());
+        return rotation_log(&UnitQuaternion::from_rotation_matrix(&turn));
+    }
+    if sine < 0.05 && cosine > 0.0 {
+        // the arcsine's series, of which the first term left out is below 1e-12
+        let square = sine * sine;
+        return axis * (0.5 + square * (1.0 / 12.0 + square * (3.0 / 80.0 + square * (5.0 / 224.0 + square * (35.0 / 2304.0)))));
+    }
+    axis * (sine.atan2(cosine) / (2.0 * sine))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::rotation_exp;
+    use std::f64::consts::PI;
+
+    #[test]
+    fn the_turn_between_two_frames_is_the_logarithm_of_their_quotient() {
+        let from = rotation_exp(&Vector3::new(0.3, -1.1, 0.7));
+        for angle in [0.0, 1e-300, 1e-9, 0.04999, 0.05001, 1.0, 2.6, 2.7, 3.1, PI - 1e-9] {
+            let turn = Vector3::new(0.36, -0.48, 0.8) * angle;
+            let to = rotation_exp(&turn) * from;
+            let [from, to] = [from, to].map(|frame| *frame.to_rotation_matrix().matrix());
+            let found = turn_between(&from, &to);
+            assert!((found - turn).norm() < 1e-9 * angle + 1e-15, "{angle}: {found}");
+        }
     }
 }

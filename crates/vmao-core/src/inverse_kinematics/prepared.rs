@@ -13,12 +13,13 @@ use crate::{
     kinematics::SerialChain,
     random::Stream,
 };
+use nalgebra::Vector6;
 
 /// Stored starts tried from the pose's own cell of the table.
 const FIRST_STARTS: usize = 12;
 /// Most iterations from a stored start: it is near already, or the way is blocked by a limit.
-const FEW_ITERATIONS: usize = 20;
-/// A seed whose tool is at most this far from the pose (m and rad together) goes before the stored starts.
+const FEW_ITERATIONS: usize = 12;
+/// A seed whose tool is at most this far from the pose (m, and difference of the rotation matrices, together) goes before the stored starts.
 const NEAR: f64 = 0.3;
 /// Stored starts, each followed by a random one, from which curves of solutions are looked for at most.
 const CURVE_STARTS: usize = 300;
@@ -45,6 +46,12 @@ pub struct InverseKinematics {
     reach: Option<ReachBound>,
 }
 
+/// A seed inside the limits and where it puts the tool.
+struct Seed {
+    q: Joints,
+    tool: Goal,
+}
+
 impl InverseKinematics {
     /// Prepares `chain`, which takes some milliseconds. Panics if it has more than 8 joints or limits in the wrong order.
     pub fn new(chain: SerialChain, settings: &IkSettings) -> Self {
@@ -63,44 +70,50 @@ impl InverseKinematics {
     /// A seed whose tool is already near goes first. Angles of the seed outside the limits are moved to them.
     /// Panics if `seed` does not fit the chain.
     pub fn solve(&self, base_from_tool: &Pose, seed: &[f64]) -> IkOutcome {
-        let (goal, seed) = (Goal::new(base_from_tool), self.solver.joints(seed));
-        let most = self.solver.settings.max_iterations;
-        let away = self.solver.evaluate(&goal, &seed).0;
-        let mut best = Attempt { q: seed, error: away, solved: false };
-        if !away.iter().all(|x| x.is_finite()) {
-            return self.verdict(&goal, &best);
-        }
-        let near = away.norm() < NEAR;
-        if near && self.improve(&mut best, &goal, seed, most) {
-            return self.verdict(&goal, &best);
-        }
-        let mut starts = [[0.0; MAX_JOINTS]; FIRST_STARTS];
-        let count = self.stored.nearest(&self.solver, &goal, &mut starts);
-        for (index, start) in starts.iter().take(count).enumerate() {
-            if self.improve(&mut best, &goal, *start, FEW_ITERATIONS) {
-                return self.verdict(&goal, &best);
-            }
-            if index == 0 && self.excluded(&goal) {
-                return self.verdict(&goal, &best);
-            }
-        }
-        if !near && self.improve(&mut best, &goal, seed, most) || self.excluded(&goal) {
-            return self.verdict(&goal, &best);
-        }
-        let restarts = self.solver.settings.restarts;
-        let around = self.stored.around(&self.solver, &goal, restarts / 2);
-        let random = self.random_starts().take(restarts - around.len());
-        for start in around.into_iter().chain(random) {
-            if self.improve(&mut best, &goal, start, most) {
-                break;
-            }
-        }
-        self.verdict(&goal, &best)
+        self.solve_from(&Goal::new(base_from_tool), &self.seed(seed))
     }
 
     /// The outcomes of [`Self::solve`] for each pose from one seed, whatever their order and number.
     pub fn solve_batch(&self, base_from_tools: &[Pose], seed: &[f64]) -> Vec<IkOutcome> {
-        base_from_tools.iter().map(|pose| self.solve(pose, seed)).collect()
+        let seed = self.seed(seed);
+        base_from_tools.iter().map(|pose| self.solve_from(&Goal::new(pose), &seed)).collect()
+    }
+
+    fn seed(&self, q: &[f64]) -> Seed {
+        let q = self.solver.joints(q);
+        Seed { q, tool: self.solver.tool(&q) }
+    }
+
+    fn solve_from(&self, goal: &Goal, seed: &Seed) -> IkOutcome {
+        let most = self.solver.settings.max_iterations;
+        let mut best = Attempt { q: seed.q, error: Vector6::repeat(f64::INFINITY), solved: false };
+        if !goal.is_finite() {
+            return self.verdict(goal, &best);
+        }
+        let near = (goal.position - seed.tool.position).norm() + (goal.rotation - seed.tool.rotation).norm() < NEAR;
+        if near && self.improve(&mut best, goal, seed.q, most) {
+            return self.verdict(goal, &best);
+        }
+        let mut starts = [[0.0; MAX_JOINTS]; FIRST_STARTS];
+        let count = self.stored.nearest(&self.solver, goal, &mut starts);
+        for (index, start) in starts.iter().take(count).enumerate() {
+            // one start in ten fails, so that it is worth a proof only when a few have
+            if self.improve(&mut best, goal, *start, FEW_ITERATIONS) || index == 2 && self.excluded(goal) {
+                return self.verdict(goal, &best);
+            }
+        }
+        if !near && self.improve(&mut best, goal, seed.q, most) || self.excluded(goal) {
+            return self.verdict(goal, &best);
+        }
+        let restarts = self.solver.settings.restarts;
+        let around = self.stored.around(&self.solver, goal, restarts / 2);
+        let random = self.random_starts().take(restarts - around.len());
+        for start in around.into_iter().chain(random) {
+            if self.improve(&mut best, goal, start, most) {
+                break;
+            }
+        }
+        self.verdict(goal, &best)
     }
 
     /// Like [`Self::solve`], but the solution nearest to `seed` (least Σ (qᵢ − seedᵢ)²) of all [`Self::branches`].
@@ -144,8 +157,7 @@ impl InverseKinematics {
 
     /// All pieces of the curves of solutions that were found.
     fn pieces(&self, goal: &Goal, seed: &Joints) -> Vec<Piece> {
-        let error = self.solver.evaluate(goal, seed).0;
-        if !error.iter().all(|x| x.is_finite()) || self.excluded(goal) {
+        if !goal.is_finite() || self.excluded(goal) {
             return Vec::new();
         }
         let (mut curves, mut found): (Vec<SelfMotion>, Vec<Piece>) = (Vec::new(), Vec::new());
@@ -194,7 +206,12 @@ impl InverseKinematics {
     }
 
     fn verdict(&self, goal: &Goal, best: &Attempt) -> IkOutcome {
-        outcome(best, self.solver.count(), || self.excluded(goal))
+        if best.error[0].is_finite() {
+            return outcome(best, self.solver.count(), || self.excluded(goal));
+        }
+        // nothing was tried, or squares overflowed
+        let error = self.solver.evaluate(goal, &best.q).0;
+        outcome(&Attempt { error, ..*best }, self.solver.count(), || self.excluded(goal))
     }
 
     fn random_starts(&self) -> impl Iterator<Item = Joints> {

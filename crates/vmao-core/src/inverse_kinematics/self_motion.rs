@@ -3,8 +3,11 @@
 //! Without limits the curves are closed. A curve is traced from one of its points, predictor along the null space and
 //! Newton's corrector, until it comes back, each joint by a whole number of turns. `pieces.rs` cuts it at the limits.
 
-use crate::damped_least_squares::{Goal, Joints, MAX_JOINTS, Solver};
-use nalgebra::{Cholesky, Const, Matrix6, Vector6};
+use crate::{
+    damped_least_squares::{Goal, Joints, MAX_JOINTS, Solver},
+    small_systems::NormalEquations,
+};
+use nalgebra::Vector6;
 use std::f64::consts::TAU;
 
 /// Longest distance between neighbouring points of a curve (rad, over all joints).
@@ -22,7 +25,6 @@ const ANCHOR_SPACING: usize = 16;
 /// Points of a curve at most; the longest seen have some hundred.
 const MOST_POINTS: usize = 5000;
 
-type Factor = Cholesky<f64, Const<6>>;
 type Columns = [Vector6<f64>; MAX_JOINTS];
 
 /// All configurations that the arm can move to from one, if it had no limits.
@@ -165,16 +167,12 @@ impl Solver {
         None
     }
 
-    fn factor(&self, columns: &Columns) -> Option<Factor> {
-        let mut normal = Matrix6::identity() * 1e-12;
-        for column in &columns[..self.count()] {
-            normal.ger(1.0, column, column, 1.0);
-        }
-        normal.cholesky()
+    fn factor(&self, columns: &Columns) -> Option<NormalEquations> {
+        NormalEquations::new(columns[..self.count()].iter(), 1e-12)
     }
 
     /// The part of `wish` that leaves the tool where it is: (I − Jᵀ(JJᵀ)⁻¹J) wish.
-    fn project(&self, columns: &Columns, factor: &Factor, wish: &Joints) -> Joints {
+    fn project(&self, columns: &Columns, factor: &NormalEquations, wish: &Joints) -> Joints {
         let motion: Vector6<f64> = (0..self.count()).map(|i| columns[i] * wish[i]).sum();
         let weights = factor.solve(&motion);
         let mut left = *wish;

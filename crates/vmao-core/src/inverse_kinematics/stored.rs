@@ -13,9 +13,9 @@ use nalgebra::{Matrix3, Vector3};
 use std::f64::consts::{PI, TAU};
 
 /// Configurations stored: as many as a second-level cache holds.
-const ENTRIES: usize = 1 << 14;
+const ENTRIES: usize = 1 << 15;
 /// Cells across distance from the first axis, height along it, and height and azimuth of the last axis's direction.
-const CELLS: [usize; 4] = [8, 14, 5, 8];
+const CELLS: [usize; 4] = [9, 16, 6, 8];
 
 /// Where the last link is, seen from the first axis and apart from the two angles left out.
 #[derive(Debug, Clone, Copy)]
@@ -93,7 +93,7 @@ impl StoredStarts {
             lower: extents.map(|(low, _)| low),
             width: extents.map(|(low, high)| (high - low).max(1e-6)),
         };
-        entries.sort_by_key(|entry| table.index(table.cell(&entry.place)));
+        entries.sort_by_cached_key(|entry| table.index(table.cell(&entry.place)));
         for entry in &entries {
             let index = table.index(table.cell(&entry.place));
             table.cells[index + 1] += 1;
