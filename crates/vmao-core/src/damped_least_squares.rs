@@ -25,8 +25,8 @@ const DAMPING: f64 = 0.1;
 const LEAST_DAMPING: f64 = 1e-8;
 /// Longest step of one joint in one iteration (rad): beyond it the linear model says nothing.
 const LONGEST_STEP: f64 = 1.0;
-/// Iterations without a tenth less error after which a start is given up.
-const PATIENCE: usize = 8;
+/// Iterations without a tenth less error after which a start is given up, where nothing says that it is near.
+pub(crate) const PATIENCE: usize = 8;
 
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Goal {
@@ -183,7 +183,7 @@ impl Solver {
     }
 
     /// Follows the damped step from one start until solved, after `most` iterations or out of patience.
-    pub(crate) fn descend(&self, goal: &Goal, start: Joints, most: usize) -> Attempt {
+    pub(crate) fn descend(&self, goal: &Goal, start: Joints, most: usize, patience: usize) -> Attempt {
         let mut q = start;
         let mut best = Attempt { q, error: Vector6::repeat(f64::INFINITY), solved: false };
         let (mut mark, mut waited) = (f64::INFINITY, 0);
@@ -199,7 +199,7 @@ impl Solver {
             waited += 1;
             if size < 0.9 * mark {
                 (mark, waited) = (size, 0);
-            } else if waited > PATIENCE {
+            } else if waited > patience {
                 break;
             }
             q = self.advance(&q, &self.step(&q, &error, &columns, &[0.0; MAX_JOINTS]));
@@ -235,7 +235,7 @@ impl Solver {
             }
         }
         // the last point slid to is rarely exact: finish it, and keep it if it is better
-        let last = self.descend(goal, q, self.settings.max_iterations);
+        let last = self.descend(goal, q, self.settings.max_iterations, PATIENCE);
         if last.solved && cost(&last.q) < least { last } else { best }
     }
 
@@ -257,7 +257,7 @@ impl Solver {
         }
         let (error, columns) = self.evaluate(goal, &q);
         q = self.advance(&q, &self.step(&q, &error, &columns, &wish));
-        self.descend(goal, q, self.settings.max_iterations)
+        self.descend(goal, q, self.settings.max_iterations, PATIENCE)
     }
 }
 

@@ -9,7 +9,7 @@ mod stored;
 pub use prepared::{Branch, InverseKinematics};
 
 use crate::{
-    damped_least_squares::{Attempt, Goal, LIMIT_ZONE, Solver},
+    damped_least_squares::{Attempt, Goal, LIMIT_ZONE, PATIENCE, Solver},
     geometry::Pose,
     joint_path::largest_turn,
     kinematics::{ChainJoint, SerialChain},
@@ -94,7 +94,7 @@ pub fn solutions(
     let (goal, seed) = (Goal::new(base_from_tool), solver.joints(seed));
     let (mut start, mut found) = (seed, Vec::new());
     for _ in 0..=settings.restarts {
-        let attempt = solver.descend(&goal, start, settings.max_iterations);
+        let attempt = solver.descend(&goal, start, settings.max_iterations, PATIENCE);
         if attempt.solved {
             let settled = solver.settle(&goal, attempt, &seed).q;
             found.push((cost(&solver.joints, &settled, &seed), settled));

@@ -1,6 +1,7 @@
 //! A running scene: state in, torques out, one tick at a time.
 
 use crate::convention::{Data, body_pose, free_joint_position, hinge_jacobian, joint_vector, mass_block};
+use crate::profile::{Stage, time};
 use crate::recorder::Recorder;
 use crate::scene::{Owner, Scene};
 use nalgebra::Vector6;
@@ -15,7 +16,7 @@ use vmao_core::osc::{ArmState, GripperGoal, JointVector, OscGains, torques};
 pub(crate) enum Grip {
     /// Go to this gap between the pads (m).
     Open(f64),
-    /// Press with this share of the greatest force.
+    /// Press with this force on each pad (N), as far as the gripper can.
     Close(f64),
 }
 
@@ -79,21 +80,9 @@ impl<'s> Simulation<'s> {
 
     /// One control tick and one physics step: torques from the state at its start.
     pub(crate) fn tick(&mut self) {
-        self.data.step1();
-        if self.data.full_m(&mut self.full_mass).is_err() {
-            // The buffer is nv × nv by construction.
-            self.full_mass.fill(0.0);
-        }
-        for arm in 0..self.scene.arms.len() {
-            let state = self.arm_state(arm);
-            let index = &self.scene.arms[arm];
-            let torque = torques(&self.gains, &state, &self.goals[arm], &index.max_torque);
-            let drive = self.grip_force(arm);
-            let ctrl = self.data.ctrl_mut();
-            ctrl[index.ctrl..index.ctrl + 7].copy_from_slice(torque.as_slice());
-            ctrl[index.ctrl + 7] = drive;
-        }
-        self.data.step2();
+        time(Stage::Physics, || self.data.step1());
+        time(Stage::Control, || self.command());
+        time(Stage::Physics, || self.data.step2());
         self.steps += 1;
         if let Some(mut recorder) = self.recorder.take() {
             recorder.observe(self);
@@ -101,6 +90,23 @@ impl<'s> Simulation<'s> {
         }
         #[cfg(test)]
         crate::tests::after_tick(self);
+    }
+
+    /// Sets every actuator to what its arm's goal asks for.
+    fn command(&mut self) {
+        if self.data.full_m(&mut self.full_mass).is_err() {
+            // The buffer is nv × nv by construction.
+            self.full_mass.fill(0.0);
+        }
+        for arm in 0..self.scene.arms.len() {
+            let state = self.arm_state(arm);
+            let index = &self.scene.arms[arm];
+            let torque = torques(&self.gains, &state, &self.goals[arm], &index.limits);
+            let drive = self.grip_force(arm);
+            let ctrl = self.data.ctrl_mut();
+            ctrl[index.ctrl..index.ctrl + 7].copy_from_slice(torque.as_slice());
+            ctrl[index.ctrl + 7] = drive;
+        }
     }
 
     fn grip_force(&self, arm: usize) -> f64 {
@@ -111,7 +117,7 @@ impl<'s> Simulation<'s> {
                 let target = ((opening - gripper.closed_gap) / 2.0).clamp(0.0, gripper.travel);
                 (OPENING_STIFFNESS * (target - self.data.qpos()[self.scene.arms[arm].finger_qpos])).clamp(-limit, limit)
             }
-            Grip::Close(share) => -share * limit,
+            Grip::Close(force) => -(2.0 * force).min(limit),
         }
     }
 

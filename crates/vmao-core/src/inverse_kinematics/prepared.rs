@@ -8,7 +8,7 @@ use super::{
     stored::StoredStarts,
 };
 use crate::{
-    damped_least_squares::{Attempt, Goal, Joints, MAX_JOINTS, Solver},
+    damped_least_squares::{Attempt, Goal, Joints, MAX_JOINTS, PATIENCE, Solver},
     geometry::Pose,
     kinematics::SerialChain,
     random::Stream,
@@ -19,6 +19,8 @@ use nalgebra::Vector6;
 const FIRST_STARTS: usize = 12;
 /// Most iterations from a stored start: it is near already, or the way is blocked by a limit.
 const FEW_ITERATIONS: usize = 12;
+/// Iterations without a tenth less error after which a stored start is given up.
+const LITTLE_PATIENCE: usize = 1;
 /// A seed whose tool is at most this far from the pose (m, and difference of the rotation matrices, together) goes before the stored starts.
 const NEAR: f64 = 0.3;
 /// Stored starts, each followed by a random one, from which curves of solutions are looked for at most.
@@ -67,7 +69,8 @@ impl InverseKinematics {
 
     /// Angles that put the tool at `base_from_tool`, the first found: from stored starts, from `seed`, from random ones.
     ///
-    /// A seed whose tool is already near goes first. Angles of the seed outside the limits are moved to them.
+    const LITTLE_PATIENCE: usize = 1;
+/// A seed whose tool is already near goes first. Angles of the seed outside the limits are moved to them.
     /// Panics if `seed` does not fit the chain.
     pub fn solve(&self, base_from_tool: &Pose, seed: &[f64]) -> IkOutcome {
         self.solve_from(&Goal::new(base_from_tool), &self.seed(seed))
@@ -91,25 +94,25 @@ impl InverseKinematics {
             return self.verdict(goal, &best);
         }
         let near = (goal.position - seed.tool.position).norm() + (goal.rotation - seed.tool.rotation).norm() < NEAR;
-        if near && self.improve(&mut best, goal, seed.q, most) {
+        if near && self.improve(&mut best, goal, seed.q, most, PATIENCE) {
             return self.verdict(goal, &best);
         }
         let mut starts = [[0.0; MAX_JOINTS]; FIRST_STARTS];
         let count = self.stored.nearest(&self.solver, goal, &mut starts);
         for (index, start) in starts.iter().take(count).enumerate() {
             // one start in ten fails, so that it is worth a proof only when a few have
-            if self.improve(&mut best, goal, *start, FEW_ITERATIONS) || index == 2 && self.excluded(goal) {
+            if self.improve(&mut best, goal, *start, FEW_ITERATIONS, LITTLE_PATIENCE) || index == 2 && self.excluded(goal) {
                 return self.verdict(goal, &best);
             }
         }
-        if !near && self.improve(&mut best, goal, seed.q, most) || self.excluded(goal) {
+        if !near && self.improve(&mut best, goal, seed.q, most, PATIENCE) || self.excluded(goal) {
             return self.verdict(goal, &best);
         }
         let restarts = self.solver.settings.restarts;
         let around = self.stored.around(&self.solver, goal, restarts / 2);
         let random = self.random_starts().take(restarts - around.len());
         for start in around.into_iter().chain(random) {
-            if self.improve(&mut best, goal, start, most) {
+            if self.improve(&mut best, goal, start, most, PATIENCE) {
                 break;
             }
         }
@@ -169,7 +172,7 @@ impl InverseKinematics {
             if unchanged == ENOUGH {
                 break;
             }
-            let Attempt { q, solved, .. } = self.solver.descend(goal, start, self.solver.settings.max_iterations);
+            let Attempt { q, solved, .. } = self.solver.descend(goal, start, self.solver.settings.max_iterations, PATIENCE);
             if !solved {
                 continue;
             }
@@ -192,8 +195,8 @@ impl InverseKinematics {
     }
 
     /// Descends from `start` and keeps what is better than `best`; whether the pose is reached.
-    fn improve(&self, best: &mut Attempt, goal: &Goal, start: Joints, most: usize) -> bool {
-        let attempt = self.solver.descend(goal, start, most);
+    fn improve(&self, best: &mut Attempt, goal: &Goal, start: Joints, most: usize, patience: usize) -> bool {
+        let attempt = self.solver.descend(goal, start, most, patience);
         if attempt.solved || attempt.error.norm() < best.error.norm() {
             *best = attempt;
         }

@@ -4,7 +4,7 @@
 //! Newton's corrector, until it comes back, each joint by a whole number of turns. `pieces.rs` cuts it at the limits.
 
 use crate::{
-    damped_least_squares::{Goal, Joints, MAX_JOINTS, Solver},
+    damped_least_squares::{Goal, Joints, MAX_JOINTS, PATIENCE, Solver},
     small_systems::NormalEquations,
 };
 use nalgebra::Vector6;
@@ -203,7 +203,7 @@ impl Solver {
         let mut best: Option<(f64, Joints)> = None;
         let (mut q, mut pull) = (*near, 1.0);
         for _ in 0..ITERATIONS {
-            let landed = self.descend(goal, q, self.settings.max_iterations);
+            let landed = self.descend(goal, q, self.settings.max_iterations, PATIENCE);
             let gap = distance(&landed.q, seed);
             match best {
                 Some((least, before)) if !landed.solved || gap >= least => {

@@ -1,7 +1,10 @@
 //! Tests that look inside a running simulation. Those that need only the public interface are in `tests/`.
 
 mod cameras;
+mod catalogue;
 mod control;
+mod internal_forces;
+mod inverse_kinematics;
 mod kinematics;
 #[path = "../../tests/support/mod.rs"]
 mod support;
