@@ -11,6 +11,7 @@ import subprocess
 import sys
 import tempfile
 import time
+import warnings
 from pathlib import Path
 
 import peer
@@ -93,7 +94,9 @@ def urdf(rows):
 
     text = "<robot name='arm'><link name='l0'/>"
     for index, (position, (w, x, y, z), limits) in enumerate(rows):
-        rpy = Rotation.from_quat([x, y, z, w]).as_euler("xyz")
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # at a quarter turn any one of the angle triples will do
+            rpy = Rotation.from_quat([x, y, z, w]).as_euler("xyz")
         origin = "<origin xyz='{} {} {}' rpy='{:.17g} {:.17g} {:.17g}'/>".format(*position, *rpy)
         ends = f"<parent link='l{index}'/><child link='l{index + 1}'/>"
         bounds = f"<axis xyz='0 0 1'/><limit lower='{limits[0]}' upper='{limits[1]}' effort='1' velocity='1'/>" if limits else ""

@@ -21,7 +21,8 @@ const FIRST_STARTS: usize = 12;
 const FEW_ITERATIONS: usize = 12;
 /// Iterations without a tenth less error after which a stored start is given up.
 const LITTLE_PATIENCE: usize = 1;
-/// A seed whose tool is at most this far from the pose (m, and difference of the rotation matrices, together) goes before the stored starts.
+/// A seed whose tool is at most this far from the pose (m, and difference of the rotation matrices, together) goes before
+/// the stored starts.
 const NEAR: f64 = 0.3;
 /// Stored starts, each followed by a random one, from which curves of solutions are looked for at most.
 const CURVE_STARTS: usize = 300;
@@ -69,8 +70,7 @@ impl InverseKinematics {
 
     /// Angles that put the tool at `base_from_tool`, the first found: from stored starts, from `seed`, from random ones.
     ///
-    const LITTLE_PATIENCE: usize = 1;
-/// A seed whose tool is already near goes first. Angles of the seed outside the limits are moved to them.
+    /// A seed whose tool is already near goes first. Angles of the seed outside the limits are moved to them.
     /// Panics if `seed` does not fit the chain.
     pub fn solve(&self, base_from_tool: &Pose, seed: &[f64]) -> IkOutcome {
         self.solve_from(&Goal::new(base_from_tool), &self.seed(seed))

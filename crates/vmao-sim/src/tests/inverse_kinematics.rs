@@ -14,7 +14,8 @@ fn flange_and_tool(scene: &Scene, data: &mut Data, arm: usize, q: &[f64]) -> [Po
     data.forward();
     let base_from_world = scene.world_from_bases[arm].inverse();
     let (last, hand) = (body_pose(data, address.bodies[q.len()]), body_pose(data, address.hand_body));
-    [last * robot.last_from_flange, hand * robot.gripper.hand_from_tool].map(|world_from_frame| base_from_world * world_from_frame)
+    [last * robot.last_from_flange, hand * robot.gripper.hand_from_tool]
+        .map(|world_from_frame| base_from_world * world_from_frame)
 }
 
 #[test]
