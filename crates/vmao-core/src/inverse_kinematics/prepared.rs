@@ -24,6 +24,9 @@ const LITTLE_PATIENCE: usize = 1;
 /// A seed whose tool is at most this far from the pose (m, and difference of the rotation matrices, together) goes before
 /// the stored starts.
 const NEAR: f64 = 0.3;
+/// Pairs of angle intervals that a proof of unreachability looks at, at first and at most.
+const FEW_CELLS: usize = 100;
+const MOST_CELLS: usize = 20_000;
 /// Stored starts, each followed by a random one, from which curves of solutions are looked for at most.
 const CURVE_STARTS: usize = 300;
 /// Solutions in a row that lie on curves known before, after which no further curve is looked for.
@@ -99,23 +102,22 @@ impl InverseKinematics {
         }
         let mut starts = [[0.0; MAX_JOINTS]; FIRST_STARTS];
         let count = self.stored.nearest(&self.solver, goal, &mut starts);
-        for (index, start) in starts.iter().take(count).enumerate() {
-            // one start in ten fails, so that it is worth a proof only when a few have
-            if self.improve(&mut best, goal, *start, FEW_ITERATIONS, LITTLE_PATIENCE) || index == 2 && self.excluded(goal) {
-                return self.verdict(goal, &best);
-            }
+        if starts[..count].iter().any(|start| self.improve(&mut best, goal, *start, FEW_ITERATIONS, LITTLE_PATIENCE)) {
+            return self.verdict(goal, &best);
         }
-        if !near && self.improve(&mut best, goal, seed.q, most, PATIENCE) || self.excluded(goal) {
+        // a hasty proof first: most poses out of reach are clearly so, and most others are solved by one start more
+        if self.excluded(goal, FEW_CELLS) {
             return self.verdict(goal, &best);
         }
         let restarts = self.solver.settings.restarts;
         let around = self.stored.around(&self.solver, goal, restarts / 2);
-        let random = self.random_starts().take(restarts - around.len());
-        for start in around.into_iter().chain(random) {
-            if self.improve(&mut best, goal, start, most, PATIENCE) {
-                break;
-            }
+        if around.iter().any(|start| self.improve(&mut best, goal, *start, FEW_ITERATIONS, LITTLE_PATIENCE)) {
+            return self.verdict(goal, &best);
         }
+        if !near && self.improve(&mut best, goal, seed.q, most, PATIENCE) || self.excluded(goal, MOST_CELLS) {
+            return self.verdict(goal, &best);
+        }
+        self.random_starts().take(restarts - around.len()).any(|start| self.improve(&mut best, goal, start, most, PATIENCE));
         self.verdict(goal, &best)
     }
 
@@ -160,7 +162,7 @@ impl InverseKinematics {
 
     /// All pieces of the curves of solutions that were found.
     fn pieces(&self, goal: &Goal, seed: &Joints) -> Vec<Piece> {
-        if !goal.is_finite() || self.excluded(goal) {
+        if !goal.is_finite() || self.excluded(goal, MOST_CELLS) {
             return Vec::new();
         }
         let (mut curves, mut found): (Vec<SelfMotion>, Vec<Piece>) = (Vec::new(), Vec::new());
@@ -203,18 +205,19 @@ impl InverseKinematics {
         best.solved
     }
 
-    fn excluded(&self, goal: &Goal) -> bool {
+    /// Whether the pose is proven out of reach, looking at no more than `cells` pairs of angle intervals.
+    fn excluded(&self, goal: &Goal, cells: usize) -> bool {
         let IkSettings { position_tolerance, rotation_tolerance, .. } = self.solver.settings;
-        self.reach.as_ref().is_some_and(|reach| reach.excludes(goal, position_tolerance, rotation_tolerance))
+        self.reach.as_ref().is_some_and(|reach| reach.excludes(goal, position_tolerance, rotation_tolerance, cells))
     }
 
     fn verdict(&self, goal: &Goal, best: &Attempt) -> IkOutcome {
         if best.error[0].is_finite() {
-            return outcome(best, self.solver.count(), || self.excluded(goal));
+            return outcome(best, self.solver.count(), || self.excluded(goal, MOST_CELLS));
         }
         // nothing was tried, or squares overflowed
         let error = self.solver.evaluate(goal, &best.q).0;
-        outcome(&Attempt { error, ..*best }, self.solver.count(), || self.excluded(goal))
+        outcome(&Attempt { error, ..*best }, self.solver.count(), || self.excluded(goal, MOST_CELLS))
     }
 
     fn random_starts(&self) -> impl Iterator<Item = Joints> {

@@ -10,8 +10,6 @@ use std::f64::consts::PI;
 
 /// Points of two axes nearer than this are one point (m).
 const COINCIDENT: f64 = 1e-9;
-/// Pairs of angle intervals looked at before the proof is given up.
-const MOST_CELLS: usize = 20_000;
 
 #[derive(Debug, Clone)]
 pub(super) struct ReachBound {
@@ -60,8 +58,9 @@ impl ReachBound {
         })
     }
 
-    /// Whether no configuration inside the limits has its tool within these tolerances of the pose (m, rad).
-    pub(super) fn excludes(&self, goal: &Goal, position_tolerance: f64, rotation_tolerance: f64) -> bool {
+    /// Whether it is proven with `most` pairs of angle intervals that no configuration inside the limits has its tool within
+    /// these tolerances of the pose (m, rad).
+    pub(super) fn excludes(&self, goal: &Goal, position_tolerance: f64, rotation_tolerance: f64, most: usize) -> bool {
         let (turn, offset) = &self.last_from_tool;
         let base_from_last = goal.rotation * turn.transpose();
         let last = goal.position - base_from_last * offset;
@@ -79,7 +78,7 @@ impl ReachBound {
             let middle = cell.map(|[low, high]| (low + high) / 2.0);
             let (near, far) = (self.base_from_first.0 * turned(middle[0], &self.shoulder), turned(-middle[1], &self.wrist));
             let distance = (last + base_from_last * far - self.base_from_first.1 - near).norm();
-            if (self.nearest - margin..=self.farthest + margin).contains(&distance) || seen > MOST_CELLS {
+            if (self.nearest - margin..=self.farthest + margin).contains(&distance) || seen > most {
                 return false;
             }
             // a point turned by an angle moves by at most the arc, and never by more than the diameter

@@ -13,7 +13,7 @@ use nalgebra::{Matrix3, Vector3};
 use std::f64::consts::{PI, TAU};
 
 /// Configurations stored: as many as a second-level cache holds.
-const ENTRIES: usize = 1 << 14;
+const ENTRIES: usize = 1 << 15;
 /// Cells across distance from the first axis, height along it, and height and azimuth of the last axis's direction.
 const CELLS: [usize; 4] = [9, 16, 6, 8];
 
