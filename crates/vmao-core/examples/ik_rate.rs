@@ -3,10 +3,10 @@
 #[path = "../tests/robots/mod.rs"]
 mod robots;
 
-use nalgebra::Vector3;
+use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 use vmao_core::{
     geometry::{Pose, interpolate, rotation_exp},
-    inverse_kinematics::{IkSettings, InverseKinematics, track},
+    inverse_kinematics::{IkOutcome, IkSettings, InverseKinematics, track},
     random::Stream,
 };
 
@@ -30,6 +30,22 @@ fn main() {
         let branches: usize = goals.iter().map(|goal| arm.branches(goal, &seed).len()).sum();
         let (mean, count) = (start.elapsed().as_secs_f64() * 1e6 / 300.0, branches as f64 / 300.0);
         println!("{name}: {count:.2} branches a pose, {mean:.0} us a pose");
+
+        // poses of any orientation in a box around the arm, of which many are out of reach
+        let mut stream = Stream::new(3, &[]);
+        let mut counts = [0; 3];
+        for _ in 0..2000 {
+            let place = Vector3::new(stream.range(-1.2, 1.2), stream.range(-1.2, 1.2), stream.range(-0.6, 1.5));
+            let [w, x, y, z] = [0; 4].map(|_| stream.normal());
+            let goal = Pose::from_parts(place.into(), UnitQuaternion::from_quaternion(Quaternion::new(w, x, y, z)));
+            counts[match arm.solve(&goal, &seed) {
+                IkOutcome::Solved { .. } => 0,
+                IkOutcome::Unreachable { .. } => 1,
+                IkOutcome::NoSolution { .. } => 2,
+            }] += 1;
+        }
+        let [solved, proven, open] = counts;
+        println!("{name}: of 2000 poses in a box {solved} solved, {proven} proven out of reach, {open} neither");
 
         // lines of 15 cm with a turn of 45 degrees, from anywhere well inside the limits, in 60 steps
         let mut stream = Stream::new(2, &[]);
