@@ -28,6 +28,7 @@ pub mod record;
 pub mod robots;
 pub mod rollout;
 pub mod shape;
+mod small_systems;
 pub mod time_parameterization;
 
 /// The code in the README, compiled and run with the documentation tests.

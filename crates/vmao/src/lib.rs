@@ -9,6 +9,7 @@ pub mod dataset;
 pub mod evaluation;
 pub mod exploration;
 pub mod failure;
+pub mod ik;
 pub mod json;
 mod json_place;
 pub mod learned_contacts;

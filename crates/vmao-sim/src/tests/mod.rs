@@ -4,6 +4,7 @@ mod cameras;
 mod catalogue;
 mod control;
 mod internal_forces;
+mod inverse_kinematics;
 mod kinematics;
 #[path = "../../tests/support/mod.rs"]
 mod support;

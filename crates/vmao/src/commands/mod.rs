@@ -6,6 +6,7 @@
 mod demo;
 mod evaluate;
 mod explore;
+mod ik;
 mod object;
 mod ocao;
 mod report;
@@ -50,6 +51,8 @@ enum Command {
     Scene(scene::SceneArguments),
     /// Goal poses of all parts and grippers from a root pose and joint positions (object-centric control)
     Ocao(ocao::OcaoArguments),
+    /// Joint positions that put a robot's flange or tool at given poses
+    Ik(ik::IkArguments),
 }
 
 /// Runs the program on these arguments, its own name first: 0 done, 1 the work failed, 2 bad input or usage.
@@ -93,6 +96,7 @@ fn execute(command: Command, command_line: &[String]) -> Result<(), Failure> {
         Command::Evaluate(arguments) => evaluate::run(&arguments, session(&arguments.common)?),
         Command::Report(arguments) => report::run(&arguments, &session(&arguments.common)?),
         Command::Scene(arguments) => scene::run(&arguments, &session(&arguments.common)?),
+        Command::Ik(arguments) => ik::run(&arguments, &session(&arguments.common)?),
         Command::Ocao(arguments) => ocao::run(&arguments, &session(&arguments.common)?),
     }
 }
