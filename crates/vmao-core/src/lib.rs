@@ -6,6 +6,7 @@
 
 pub mod catalogue;
 pub mod collision;
+mod collision_checker;
 pub mod contact;
 pub mod contact_model;
 mod damped_least_squares;
@@ -23,11 +24,13 @@ pub mod order;
 pub mod osc;
 pub mod outcome;
 pub mod planning;
+pub mod planning_problems;
 pub mod random;
 pub mod record;
 pub mod robots;
 pub mod rollout;
 pub mod shape;
+mod swept;
 pub mod time_parameterization;
 
 /// The code in the README, compiled and run with the documentation tests.

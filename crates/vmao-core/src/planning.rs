@@ -1,7 +1,7 @@
 //! Motion planning for all arms together: straight line, one arm at a time, then RRT-Connect, then shortcuts.
 //!
-//! RRT-Connect is Kuffner & LaValle, ICRA 2000, in the joint space of all arms at once. Edges are checked at
-//! `PlanSettings::step`; a finished path is checked again five times finer, and planned anew at a finer step if it fails.
+//! RRT-Connect is Kuffner & LaValle, ICRA 2000, in the joint space of all arms at once. Edges are checked without gaps
+//! ([`CollisionChecker::edge_is_free`]): a path is clear by half the margin everywhere, not only at samples.
 
 use crate::{
     collision::{CollisionChecker, CollisionPair, CollisionWorld},
@@ -14,8 +14,6 @@ use std::fmt;
 /// How hard to look for a path and how closely to check it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PlanSettings {
-    /// Most any joint turns between two collision checks while planning (rad); the result is checked five times finer.
-    pub step: f64,
     /// Longest new branch of a tree, by its most moved joint (rad).
     pub extension: f64,
     /// Most random samples.
@@ -30,8 +28,8 @@ pub struct PlanSettings {
 
 impl Default for PlanSettings {
     fn default() -> Self {
-        let (step, extension, margin) = (0.05, 0.6, 0.005);
-        Self { step, extension, max_iterations: 20_000, shortcut_iterations: 150, margin, frozen_arms: Vec::new() }
+        let (extension, margin) = (0.6, 0.005);
+        Self { extension, max_iterations: 20_000, shortcut_iterations: 150, margin, frozen_arms: Vec::new() }
     }
 }
 
@@ -51,8 +49,19 @@ pub enum PlanFailure {
     StartInCollision(CollisionPair),
     /// The goal is closer than the margin to a collision.
     GoalInCollision(CollisionPair),
-    /// The start or the goal is outside the joint limits.
-    OutOfLimits,
+    /// The start is outside the joint limits by more than [`START_TOLERANCE`], or the goal is outside.
+    OutOfLimits {
+        /// Whether it is the goal.
+        at_goal: bool,
+        /// Index of the arm.
+        arm: usize,
+        /// Index of the joint in its arm.
+        joint: usize,
+        /// Its angle (rad).
+        angle: f64,
+        /// Lowest and highest angle (rad).
+        range: [f64; 2],
+    },
     /// No path was found in `max_iterations` samples; this does not say that there is none.
     BudgetExhausted,
 }
@@ -62,57 +71,59 @@ impl fmt::Display for PlanFailure {
         match self {
             Self::StartInCollision(pair) => write!(f, "at the start, {pair}"),
             Self::GoalInCollision(pair) => write!(f, "at the end, {pair}"),
-            Self::OutOfLimits => write!(f, "start or end outside the joint limits"),
-            Self::BudgetExhausted => write!(f, "no path within the budget of samples"),
+            Self::OutOfLimits { at_goal, arm, joint, angle, range: [low, high] } => {
+                let end = if *at_goal { "end" } else { "start" };
+                write!(f, "at the {end}, joint {} of arm {arm} is at {angle} rad, outside its limits [{low}, {high}]", joint + 1)
+            }
+            Self::BudgetExhausted => write!(f, "no path found within the budget of samples; there may be one"),
         }
     }
 }
 
+/// How far outside its limits a joint may start (rad): controllers overshoot by less.
+pub const START_TOLERANCE: f64 = 0.01;
+
 /// A collision-free path of all arms from `start` to `goal` (flat, arm after arm, rad).
 ///
-/// A frozen arm stays at its start whatever the goal says. Panics if `start` or `goal` has not one angle per joint.
+/// A joint that starts outside its limits by at most [`START_TOLERANCE`] starts at the limit: the path's first point may
+/// differ from `start` by that. A frozen arm stays at its start, wherever that is and whatever the goal says. Panics if
+/// `start` or `goal` has not one angle per joint.
 pub fn plan(world: &CollisionWorld, start: &[f64], goal: &[f64], settings: &PlanSettings, stream: &mut Stream) -> PlanOutcome {
     let mut planner = Planner::new(world, settings);
     assert!(start.len() == planner.free.len() && goal.len() == start.len(), "one angle per joint of all arms");
+    let start: Vec<f64> = (0..start.len()).map(|i| planner.start_angle(i, start[i])).collect();
     let goal: Vec<f64> = (0..start.len()).map(|i| if planner.free[i] { goal[i] } else { start[i] }).collect();
-    if !world.within_limits(start) || !world.within_limits(&goal) {
-        return PlanOutcome::Failed(PlanFailure::OutOfLimits);
+    for (at_goal, q) in [(false, &start), (true, &goal)] {
+        if let Some(failure) = planner.out_of_limits(at_goal, q) {
+            return PlanOutcome::Failed(failure);
+        }
     }
-    if let Some(pair) = planner.checker.check(start, settings.margin) {
+    if let Some(pair) = planner.checker.check(&start, settings.margin) {
         return PlanOutcome::Failed(PlanFailure::StartInCollision(pair));
     }
     if let Some(pair) = planner.checker.check(&goal, settings.margin) {
         return PlanOutcome::Failed(PlanFailure::GoalInCollision(pair));
     }
-    let finest = settings.step / FINER;
-    for step in [settings.step, settings.step / 2.0, finest] {
-        planner.step = step;
-        let Some(mut path) = planner.find(start, &goal, stream) else { break };
-        planner.shorten(&mut path, stream);
-        planner.step = finest;
-        if step == finest || planner.is_free(&path) {
-            return PlanOutcome::Path(path);
+    match planner.find(&start, &goal, stream) {
+        Some(mut path) => {
+            planner.shorten(&mut path, stream);
+            PlanOutcome::Path(path)
         }
+        None => PlanOutcome::Failed(PlanFailure::BudgetExhausted),
     }
-    PlanOutcome::Failed(PlanFailure::BudgetExhausted)
 }
 
 /// The first edge of `path` that comes closer to a collision than the margin, and what collides there.
 ///
-/// For paths made elsewhere, such as tracked lines of the tool; checked at a fifth of `settings.step`, like plans.
-/// Panics if a waypoint has not one angle per joint.
+/// For paths made elsewhere, such as tracked lines of the tool; checked without gaps, like plans. Panics if a waypoint has
+/// not one angle per joint.
 pub fn first_collision(world: &CollisionWorld, path: &[Vec<f64>], settings: &PlanSettings) -> Option<(usize, CollisionPair)> {
     let mut checker = CollisionChecker::with_frozen(world, &settings.frozen_arms);
     if let Some(pair) = path.first().and_then(|start| checker.check(start, settings.margin)) {
         return Some((0, pair));
     }
-    path.windows(2).enumerate().find_map(|(edge, ends)| {
-        let count = (largest_turn(&ends[0], &ends[1]) / settings.step * FINER).ceil().max(1.0) as usize;
-        (1..=count).find_map(|i| {
-            let pair = checker.check(&blend(&ends[0], &ends[1], i as f64 / count as f64), settings.margin)?;
-            Some((edge, pair))
-        })
-    })
+    let hit = |(edge, ends): (usize, &[Vec<f64>])| Some((edge, checker.check_edge(&ends[0], &ends[1], settings.margin)?));
+    path.windows(2).enumerate().find_map(hit)
 }
 
 /// Times a path, cutting its corners as widely as stays free of collision by half the margin, sampled every 5 ms.
@@ -134,14 +145,10 @@ pub fn time_path(
     })
 }
 
-/// How many times finer than `PlanSettings::step` a finished path is checked.
-const FINER: f64 = 5.0;
-
 struct Planner<'a> {
     world: &'a CollisionWorld,
     settings: &'a PlanSettings,
     checker: CollisionChecker<'a>,
-    step: f64,
     samples_left: usize,
     /// Whether each joint may move.
     free: Vec<bool>,
@@ -157,12 +164,26 @@ impl<'a> Planner<'a> {
             world,
             settings,
             checker: CollisionChecker::with_frozen(world, &settings.frozen_arms),
-            step: settings.step,
             samples_left: settings.max_iterations,
             free: arms().map(|(arm, _)| !settings.frozen_arms.contains(&arm)).collect(),
             arm_of: arms().map(|(arm, _)| arm).collect(),
             limits: arms().map(|(_, joint)| [joint.lower, joint.upper]).collect(),
         }
+    }
+
+    /// The angle joint `i` starts at: one a little outside its limits is at the limit, those of frozen arms stay.
+    fn start_angle(&self, i: usize, angle: f64) -> f64 {
+        let [low, high] = self.limits[i];
+        let inside = angle.clamp(low, high);
+        if self.free[i] && (inside - angle).abs() <= START_TOLERANCE { inside } else { angle }
+    }
+
+    fn out_of_limits(&self, at_goal: bool, q: &[f64]) -> Option<PlanFailure> {
+        let outside = |&i: &usize| self.free[i] && !(self.limits[i][0]..=self.limits[i][1]).contains(&q[i]);
+        let i = (0..q.len()).find(outside)?;
+        let (arm, range) = (self.arm_of[i], self.limits[i]);
+        let joint = self.arm_of[..i].iter().filter(|&&other| other == arm).count();
+        Some(PlanFailure::OutOfLimits { at_goal, arm, joint, angle: q[i], range })
     }
 
     fn find(&mut self, start: &[f64], goal: &[f64], stream: &mut Stream) -> Option<Vec<Vec<f64>>> {
@@ -238,14 +259,8 @@ impl<'a> Planner<'a> {
         self.edge_is_free(from, &to).then(|| tree.push(&to, nearest))
     }
 
-    /// Whether the straight line is free at the present step, its start excepted; middles first, they fail soonest.
     fn edge_is_free(&mut self, from: &[f64], to: &[f64]) -> bool {
-        let count = (largest_turn(from, to) / self.step).ceil().max(1.0) as u32;
-        let bits = u32::BITS - count.leading_zeros();
-        (0..1_u32 << bits).map(|i| i.reverse_bits() >> (u32::BITS - bits)).filter(|i| (1..=count).contains(i)).all(|i| {
-            let q = if i == count { to.to_vec() } else { blend(from, to, f64::from(i) / f64::from(count)) };
-            self.checker.is_free(&q, self.settings.margin)
-        })
+        self.checker.edge_is_free(from, to, self.settings.margin)
     }
 
     fn is_free(&mut self, path: &[Vec<f64>]) -> bool {

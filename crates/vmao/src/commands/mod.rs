@@ -8,6 +8,7 @@ mod evaluate;
 mod explore;
 mod object;
 mod ocao;
+mod plan;
 mod report;
 mod scene;
 mod session;
@@ -50,6 +51,8 @@ enum Command {
     Scene(scene::SceneArguments),
     /// Goal poses of all parts and grippers from a root pose and joint positions (object-centric control)
     Ocao(ocao::OcaoArguments),
+    /// A collision-free path of several arms at once
+    Plan(plan::PlanArguments),
 }
 
 /// Runs the program on these arguments, its own name first: 0 done, 1 the work failed, 2 bad input or usage.
@@ -80,6 +83,7 @@ fn execute(command: Command, command_line: &[String]) -> Result<(), Failure> {
         Command::Report(arguments) => report::run(&arguments, &session(&arguments.common)?),
         Command::Scene(arguments) => scene::run(&arguments, &session(&arguments.common)?),
         Command::Ocao(arguments) => ocao::run(&arguments, &session(&arguments.common)?),
+        Command::Plan(arguments) => plan::run(&arguments, &session(&arguments.common)?),
     }
 }
 
