@@ -63,6 +63,7 @@ fn solved(problem: &PlanningProblem, index: u64) -> Value {
 
 /// CPU time of this thread so far as the kernel's scheduler counts it (s); only Linux tells.
 fn cpu_seconds() -> Option<f64> {
+    std::thread::yield_now(); // the count is brought up to date when the scheduler is called
     let text = std::fs::read_to_string("/proc/thread-self/schedstat").ok()?;
     Some(text.split(' ').next()?.parse::<f64>().ok()? * 1e-9)
 }

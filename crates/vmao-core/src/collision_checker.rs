@@ -2,7 +2,7 @@
 
 use crate::{
     collision::{ArmCollisionModel, Collider, CollisionPair, CollisionWorld, LinkSolid},
-    distance::Convex,
+    distance::{Convex, Nearness},
     geometry::Pose,
     swept::{Reaches, Sweep},
 };
@@ -39,17 +39,6 @@ pub(crate) struct Pair {
     /// Another solid, or [`FLOOR`].
     pub(crate) second: u32,
     reach: f64,
-}
-
-/// How near two solids are.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Nearness {
-    /// At least as far apart as asked for.
-    Clear,
-    /// In between.
-    Near,
-    /// Closer than the margin.
-    Hit,
 }
 
 /// The fixed transforms of an arm's kinematics and where its joints and solids are in the flat lists.
@@ -101,7 +90,7 @@ impl<'a> CollisionChecker<'a> {
             let solids = local[arm.first_slot..].iter().zip(&arm.carriers).map(|(&(_, convex), &link)| (link, convex));
             Reaches::new(&arm.parent_from_joints, arm.first_joint, arm.first_slot, solids)
         });
-        let sweep = Sweep::new(reaches.collect(), local.len(), &pairs);
+        let sweep = Sweep::new(reaches.collect(), local.len(), &pairs, frozen);
         let floor = world.floor_height.unwrap_or(f64::NEG_INFINITY);
         let posed = vec![f64::NAN; world.joint_count()];
         Self { world, arms, local, placed, centers, pairs, floor, posed, links: Vec::new(), sweep }
@@ -160,10 +149,15 @@ impl<'a> CollisionChecker<'a> {
             return Nearness::Clear;
         }
         let (a, b) = (&self.placed[i], &self.placed[j]);
-        if !a.closer_than(b, enough) {
-            return Nearness::Clear;
+        if margin <= 0.0 {
+            // the depth decides, which a gap does not tell
+            return match () {
+                () if a.closer_than(b, margin) => Nearness::Hit,
+                () if a.closer_than(b, enough) => Nearness::Near,
+                () => Nearness::Clear,
+            };
         }
-        if enough == margin || a.closer_than(b, margin) { Nearness::Hit } else { Nearness::Near }
+        a.nearness(b, margin, enough)
     }
 
     fn gap_of_balls(&self, pair: &Pair) -> f64 {

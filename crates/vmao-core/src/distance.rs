@@ -13,6 +13,17 @@ const MAX_GENERATORS: usize = 7;
 /// Half the number of sides of the prism around a cylinder; it sticks out by 1/cos(π/12) − 1 = 3.5 % of the radius.
 const PRISM_GENERATORS: usize = 6;
 
+/// How near two solids are.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Nearness {
+    /// At least as far apart as asked for.
+    Clear,
+    /// In between.
+    Near,
+    /// Closer than the margin.
+    Hit,
+}
+
 /// A convex solid: { centre + Σ aᵢ gᵢ, |aᵢ| ≤ 1 } grown by a radius (m).
 #[derive(Debug, Clone, Copy)]
 pub struct Convex {
@@ -24,6 +35,8 @@ pub struct Convex {
     /// The capsule around the solid: half its axis (m) and its radius (m).
     spine: Vector3<f64>,
     girth: f64,
+    /// Lengths of a box's generators (m).
+    lengths: [f64; BOX],
 }
 
 /// Number of generators of a box; no other solid has as many.
@@ -40,6 +53,7 @@ impl Convex {
             bound: 0.0,
             spine: Vector3::zeros(),
             girth: 0.0,
+            lengths: [0.0; BOX],
         };
         match *shape {
             Shape::Sphere { radius } => (local.radius, local.girth) = (radius, radius),
@@ -62,7 +76,7 @@ impl Convex {
                 local.push(Vector3::x() * x);
                 local.push(Vector3::y() * y);
                 local.push(Vector3::z() * z);
-                local.bound = Vector3::new(x, y, z).norm();
+                (local.bound, local.lengths) = (Vector3::new(x, y, z).norm(), [x, y, z]);
                 let longest = local.generators[..local.count].iter().copied().max_by(|a, b| a.norm().total_cmp(&b.norm()));
                 local.spine = longest.unwrap_or_default();
                 local.girth = (local.bound * local.bound - local.spine.norm_squared()).max(0.0).sqrt();
@@ -127,41 +141,109 @@ impl Convex {
             return false;
         }
         let cores = margin + self.radius + other.radius;
-        if cores <= 0.0 {
-            return self.signed_distance(other) < margin;
+        if cores <= 0.0 { self.signed_distance(other) < margin } else { self.gap(other, margin) < margin }
+    }
+
+    /// The distance of the solids if it is less than `enough` (m), otherwise anything that is not less.
+    ///
+    /// Where the cores inside the radii meet it is minus both radii, however deep. `enough` must be more than that.
+    fn gap(&self, other: &Self, enough: f64) -> f64 {
+        match self.rough_gap(other, enough) {
+            Ok(gap) => gap,
+            Err(least) if least >= enough => least,
+            Err(_) => self.fine_gap(other, enough),
         }
+    }
+
+    /// Whether the solids are closer than `margin` (m, > 0), at least `enough` apart, or in between.
+    ///
+    /// While `enough` is large, solids that are not closer than `margin` may count as in between though they are further.
+    pub(crate) fn nearness(&self, other: &Self, margin: f64, enough: f64) -> Nearness {
+        const LARGE: f64 = 0.05; // m; not worth the iteration, a shorter interval will ask again
+        let gap = match self.rough_gap(other, enough) {
+            Ok(gap) => gap,
+            Err(least) if least >= enough || (least >= margin && enough > LARGE) => least,
+            Err(_) => self.fine_gap(other, enough),
+        };
+        match gap {
+            _ if gap >= enough => Nearness::Clear,
+            _ if gap >= margin => Nearness::Near,
+            _ => Nearness::Hit,
+        }
+    }
+
+    /// The gap from capsules around both solids or around one beside a box; the error is a lower bound of it.
+    fn rough_gap(&self, other: &Self, enough: f64) -> Result<f64, f64> {
         let offset = self.center - other.center;
-        // capsules around both first: what they leave is settled by them alone if both are capsules
-        let around = margin + self.girth + other.girth;
         let (a_is_box, b_is_box) = (self.count == BOX, other.count == BOX);
-        let apart = match (a_is_box, b_is_box) {
-            (false, false) => segment_distance(&offset, &self.spine, &other.spine) >= around,
+        let gap = match (a_is_box, b_is_box) {
+            (false, false) => segment_distance(&offset, &self.spine, &other.spine) - self.girth - other.girth,
             (true, _) if !b_is_box || self.bound >= other.bound => {
-                box_to_segment(&-offset, &self.generators, &other.spine) >= margin + other.girth
+                self.box_to_segment(&-offset, &other.spine, enough + other.girth) - other.girth
             }
-            _ => box_to_segment(&offset, &other.generators, &self.spine) >= margin + self.girth,
+            _ => other.box_to_segment(&offset, &self.spine, enough + self.girth) - self.girth,
         };
         let exact = (self.count <= 1 || a_is_box) && (other.count <= 1 || b_is_box) && !(a_is_box && b_is_box);
-        if apart || exact {
-            return !apart;
-        }
-        if self.faces_separate(other, cores) || other.faces_separate(self, cores) {
-            return false;
+        if exact { Ok(gap) } else { Err(gap) }
+    }
+
+    fn fine_gap(&self, other: &Self, enough: f64) -> f64 {
+        let radius = self.radius + other.radius;
+        if self.faces_separate(other, enough + radius) || other.faces_separate(self, enough + radius) {
+            return enough;
         }
         let (generators, count) = self.difference(other);
-        core_distance(&offset, &generators[..count], cores) < cores
+        core_distance(&(self.center - other.center), &generators[..count], enough + radius) - radius
     }
 
     /// Whether a face of this box shows that the cores are at least `cores` apart (m); never for other solids.
     fn faces_separate(&self, other: &Self, cores: f64) -> bool {
         let offset = self.center - other.center;
         self.count == BOX
-            && self.generators[..BOX].iter().any(|normal| {
-                let square = normal.norm_squared();
+            && self.generators[..BOX].iter().zip(self.lengths).any(|(normal, length)| {
                 let reach: f64 = other.generators[..other.count].iter().map(|g| g.dot(normal).abs()).sum();
-                let gap = offset.dot(normal).abs() - square - reach;
-                gap > 0.0 && gap * gap >= cores * cores * square
+                offset.dot(normal).abs() - reach >= (cores + length) * length
             })
+    }
+
+    /// Distance from this box to the segment `middle` ± `half` (m; from its centre) if less than `enough`; 0 if they meet.
+    ///
+    /// Half the square's derivative along the segment is piecewise linear and never falls: its zero lies between the last
+    /// bend or end where it is negative and the first where it is not.
+    fn box_to_segment(&self, middle: &Vector3<f64>, half: &Vector3<f64>, enough: f64) -> f64 {
+        let lengths = &self.lengths;
+        let (mut m, mut d) = ([0.0; BOX], [0.0; BOX]);
+        for axis in 0..BOX {
+            m[axis] = middle.dot(&self.generators[axis]) / lengths[axis];
+            d[axis] = half.dot(&self.generators[axis]) / lengths[axis];
+            let beyond = m[axis].abs() - d[axis].abs() - lengths[axis];
+            if beyond >= enough {
+                return beyond;
+            }
+        }
+        let outside = |axis: usize, t: f64| {
+            let x = m[axis] + d[axis] * t;
+            x - x.clamp(-lengths[axis], lengths[axis])
+        };
+        let slope = |t: f64| (0..BOX).map(|axis| d[axis] * outside(axis, t)).sum::<f64>();
+        let distance = |t: f64| (0..BOX).map(|axis| outside(axis, t).powi(2)).sum::<f64>().sqrt();
+        let (mut low, mut high) = ((-1.0, slope(-1.0)), (1.0, slope(1.0)));
+        if low.1 >= 0.0 {
+            return distance(-1.0);
+        }
+        if high.1 <= 0.0 {
+            return distance(1.0);
+        }
+        for axis in 0..BOX {
+            for face in [-lengths[axis], lengths[axis]] {
+                let t = (face - m[axis]) / d[axis]; // infinite or NaN along the face: no bend
+                if t > low.0 && t < high.0 {
+                    let at = (t, slope(t));
+                    if at.1 < 0.0 { low = at } else { high = at }
+                }
+            }
+        }
+        distance(low.0 + (high.0 - low.0) * low.1 / (low.1 - high.1))
     }
 
     fn push(&mut self, generator: Vector3<f64>) {
@@ -199,43 +281,6 @@ fn segment_distance(offset: &Vector3<f64>, g: &Vector3<f64>, h: &Vector3<f64>) -
     };
     let ends = [best(offset + g, h, hh), best(offset - g, h, hh), best(-offset + h, g, gg), best(-offset - h, g, gg)];
     ends.into_iter().fold(f64::INFINITY, f64::min).sqrt()
-}
-
-/// Distance from a box of three square generators at the origin to the segment `middle` ± `half` (m); 0 if they meet.
-///
-/// Half the square's derivative along the segment is piecewise linear and never falls: its zero lies between the last
-/// bend or end where it is negative and the first where it is not.
-fn box_to_segment(middle: &Vector3<f64>, generators: &[Vector3<f64>; MAX_GENERATORS], half: &Vector3<f64>) -> f64 {
-    let mut lengths = [0.0; BOX];
-    let (mut m, mut d) = ([0.0; BOX], [0.0; BOX]);
-    for (axis, generator) in generators[..BOX].iter().enumerate() {
-        lengths[axis] = generator.norm();
-        m[axis] = middle.dot(generator) / lengths[axis];
-        d[axis] = half.dot(generator) / lengths[axis];
-    }
-    let outside = |axis: usize, t: f64| {
-        let x = m[axis] + d[axis] * t;
-        x - x.clamp(-lengths[axis], lengths[axis])
-    };
-    let slope = |t: f64| (0..BOX).map(|axis| d[axis] * outside(axis, t)).sum::<f64>();
-    let distance = |t: f64| (0..BOX).map(|axis| outside(axis, t).powi(2)).sum::<f64>().sqrt();
-    let (mut low, mut high) = ((-1.0, slope(-1.0)), (1.0, slope(1.0)));
-    if low.1 >= 0.0 {
-        return distance(-1.0);
-    }
-    if high.1 <= 0.0 {
-        return distance(1.0);
-    }
-    for axis in 0..BOX {
-        for face in [-lengths[axis], lengths[axis]] {
-            let t = (face - m[axis]) / d[axis]; // infinite or NaN along the face: no bend
-            if t > low.0 && t < high.0 {
-                let at = (t, slope(t));
-                if at.1 < 0.0 { low = at } else { high = at }
-            }
-        }
-    }
-    distance(low.0 + (high.0 - low.0) * low.1 / (low.1 - high.1))
 }
 
 /// Greatest separation of the origin from the zonotope at `offset` over its facet normals; negative is the depth inside.

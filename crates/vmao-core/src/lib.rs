@@ -9,6 +9,7 @@ pub mod collision;
 mod collision_checker;
 pub mod contact;
 pub mod contact_model;
+mod coordination;
 mod damped_least_squares;
 pub mod distance;
 pub mod geometry;

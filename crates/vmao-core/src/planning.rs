@@ -1,4 +1,4 @@
-//! Motion planning for all arms together: straight line, one arm at a time, then RRT-Connect, then shortcuts.
+//! Motion planning for all arms together: straight line, arms one by one, RRT-Connect in all joints, then shortcuts.
 //!
 //! RRT-Connect is Kuffner & LaValle, ICRA 2000, in the joint space of all arms at once. Edges are checked without gaps
 //! ([`CollisionChecker::edge_is_free`]): a path is clear by half the margin everywhere, not only at samples.
@@ -7,9 +7,10 @@ use crate::{
     collision::{CollisionChecker, CollisionPair, CollisionWorld},
     joint_path::{Tree, at_length, blend, distance, largest_turn, length, remove_collinear},
     random::Stream,
+    swept::Scope,
     time_parameterization::{MotionLimits, Trajectory},
 };
-use std::fmt;
+use std::{fmt, ops::Range};
 
 /// How hard to look for a path and how closely to check it.
 #[derive(Debug, Clone, PartialEq)]
@@ -18,8 +19,10 @@ pub struct PlanSettings {
     pub extension: f64,
     /// Most random samples.
     pub max_iterations: usize,
-    /// Attempts to shorten the path.
+    /// Most attempts to shorten a path.
     pub shortcut_iterations: usize,
+    /// Shortening ends after this many attempts in succession that gained less than a thousandth.
+    pub shortcut_patience: usize,
     /// Least distance between things that must not touch (m).
     pub margin: f64,
     /// Arms that stay at their start; they are in the way of the others, but may keep the contacts they have.
@@ -29,7 +32,8 @@ pub struct PlanSettings {
 impl Default for PlanSettings {
     fn default() -> Self {
         let (extension, margin) = (0.6, 0.005);
-        Self { extension, max_iterations: 20_000, shortcut_iterations: 150, margin, frozen_arms: Vec::new() }
+        let (shortcut_iterations, shortcut_patience) = (150, 6);
+        Self { extension, max_iterations: 20_000, shortcut_iterations, shortcut_patience, margin, frozen_arms: Vec::new() }
     }
 }
 
@@ -145,11 +149,12 @@ pub fn time_path(
     })
 }
 
-struct Planner<'a> {
+pub(crate) struct Planner<'a> {
     world: &'a CollisionWorld,
     settings: &'a PlanSettings,
+    /// The pairs that count now.
+    scope: Scope,
     checker: CollisionChecker<'a>,
-    samples_left: usize,
     /// Whether each joint may move.
     free: Vec<bool>,
     /// The arm of each joint.
@@ -163,8 +168,8 @@ impl<'a> Planner<'a> {
         Self {
             world,
             settings,
+            scope: Scope::All,
             checker: CollisionChecker::with_frozen(world, &settings.frozen_arms),
-            samples_left: settings.max_iterations,
             free: arms().map(|(arm, _)| !settings.frozen_arms.contains(&arm)).collect(),
             arm_of: arms().map(|(arm, _)| arm).collect(),
             limits: arms().map(|(_, joint)| [joint.lower, joint.upper]).collect(),
@@ -190,36 +195,49 @@ impl<'a> Planner<'a> {
         if self.edge_is_free(start, goal) {
             return Some(vec![start.to_vec(), goal.to_vec()]);
         }
-        self.one_arm_after_the_other(start, goal).or_else(|| self.grow_trees(start, goal, stream))
+        self.coordinated(start, goal, stream).or_else(|| self.grow_trees(start, goal, self.settings.max_iterations, stream))
     }
 
-    /// Tries to move whole arms in turn, in every order: cheap, and often all that crossed arms need.
-    fn one_arm_after_the_other(&mut self, start: &[f64], goal: &[f64]) -> Option<Vec<Vec<f64>>> {
-        const MOST_ARMS: usize = 4; // 24 orders
-        let moves = |&arm: &usize| (0..start.len()).any(|i| self.arm_of[i] == arm && start[i] != goal[i]);
-        let arms: Vec<usize> = (0..self.world.arms.len()).filter(moves).collect();
-        if arms.len() < 2 || arms.len() > MOST_ARMS {
-            return None;
+    /// The joints of each arm.
+    pub(crate) fn arms(&self) -> Vec<Range<usize>> {
+        self.arm_of
+            .chunk_by(|a, b| a == b)
+            .scan(0, |first, own| {
+                let joints = *first..*first + own.len();
+                *first = joints.end;
+                Some(joints)
+            })
+            .collect()
+    }
+
+    /// A short way of one arm as if no other moved; both ends differ in its joints only.
+    pub(crate) fn alone(
+        &mut self,
+        joints: &Range<usize>,
+        start: &[f64],
+        goal: &[f64],
+        stream: &mut Stream,
+    ) -> Option<Vec<Vec<f64>>> {
+        const SHARE: usize = 4; // of the samples, so that the search in all joints has its own
+        let free = (0..self.free.len()).map(|i| joints.contains(&i)).collect();
+        let all = std::mem::replace(&mut self.free, free);
+        self.scope = Scope::Own(self.arm_of[joints.start]);
+        let mut path = if self.edge_is_free(start, goal) {
+            Some(vec![start.to_vec(), goal.to_vec()])
+        } else {
+            self.grow_trees(start, goal, self.settings.max_iterations / SHARE, stream)
+        };
+        if let Some(path) = &mut path {
+            self.shorten(path, stream);
         }
-        orders(&arms).into_iter().find_map(|order| {
-            let mut path = vec![start.to_vec()];
-            for arm in order {
-                let from = path.last()?;
-                let to: Vec<f64> = (0..from.len()).map(|i| if self.arm_of[i] == arm { goal[i] } else { from[i] }).collect();
-                if !self.edge_is_free(from, &to) {
-                    return None;
-                }
-                path.push(to);
-            }
-            Some(path)
-        })
+        (self.scope, self.free) = (Scope::All, all);
+        path
     }
 
-    fn grow_trees(&mut self, start: &[f64], goal: &[f64], stream: &mut Stream) -> Option<Vec<Vec<f64>>> {
+    fn grow_trees(&mut self, start: &[f64], goal: &[f64], samples: usize, stream: &mut Stream) -> Option<Vec<Vec<f64>>> {
         let mut trees = [Tree::new(start), Tree::new(goal)];
         let mut side = 0;
-        while self.samples_left > 0 {
-            self.samples_left -= 1;
+        for _ in 0..samples {
             let limits = self.limits.iter().zip(&self.free).zip(start);
             let sample: Vec<f64> =
                 limits.map(|((&[low, high], &free), &at)| if free { stream.range(low, high) } else { at }).collect();
@@ -260,7 +278,11 @@ impl<'a> Planner<'a> {
     }
 
     fn edge_is_free(&mut self, from: &[f64], to: &[f64]) -> bool {
-        self.checker.edge_is_free(from, to, self.settings.margin)
+        self.edge_is_free_in(self.scope, from, to)
+    }
+
+    pub(crate) fn edge_is_free_in(&mut self, scope: Scope, from: &[f64], to: &[f64]) -> bool {
+        self.checker.edge_is_free_in(scope, from, to, self.settings.margin)
     }
 
     fn is_free(&mut self, path: &[Vec<f64>]) -> bool {
@@ -269,11 +291,13 @@ impl<'a> Planner<'a> {
 
     /// Replaces random stretches by straight lines, of all arms or of one arm alone, where that is free and shorter.
     fn shorten(&mut self, path: &mut Vec<Vec<f64>>, stream: &mut Stream) {
-        let arms = self.world.arms.len();
+        let arms = if self.scope == Scope::All { self.world.arms.len() } else { 1 };
+        let mut failures = 0;
         for _ in 0..self.settings.shortcut_iterations {
-            if path.len() <= 2 {
-                return;
+            if path.len() <= 2 || failures > self.settings.shortcut_patience {
+                break;
             }
+            failures += 1;
             let total = length(path);
             let (a, b) = (stream.unit() * total, stream.unit() * total);
             let choice = if arms > 1 { stream.index(arms + 1) } else { 0 };
@@ -293,10 +317,11 @@ impl<'a> Planner<'a> {
             let mut candidate = path[..=first].to_vec();
             candidate.extend(stretch.iter().cloned());
             candidate.extend_from_slice(&path[last + 1..]);
-            let start_is_free = |this: &mut Self| this.checker.is_free(&stretch[0], this.settings.margin);
-            if length(&candidate) < total - 1e-9 && start_is_free(self) && self.is_free(&stretch) {
+            // the stretch begins on the path, which is clear
+            if length(&candidate) < total * (1.0 - 1e-3) && self.is_free(&stretch) {
                 candidate.dedup();
                 *path = candidate;
+                failures = 0;
             }
         }
         remove_collinear(path);
@@ -316,18 +341,4 @@ impl<'a> Planner<'a> {
             }
         }
     }
-}
-
-fn orders(items: &[usize]) -> Vec<Vec<usize>> {
-    if items.is_empty() {
-        return vec![Vec::new()];
-    }
-    let led_by = |i: usize| {
-        let rest: Vec<usize> = items.iter().copied().filter(|&item| item != items[i]).collect();
-        orders(&rest).into_iter().map(move |mut order| {
-            order.insert(0, items[i]);
-            order
-        })
-    };
-    (0..items.len()).flat_map(led_by).collect()
 }

@@ -6,8 +6,8 @@
 
 use crate::{
     collision::CollisionPair,
-    collision_checker::{CollisionChecker, FLOOR, Nearness, Pair},
-    distance::Convex,
+    collision_checker::{CollisionChecker, FLOOR, Pair},
+    distance::{Convex, Nearness},
 };
 use nalgebra::{Matrix3, Vector3};
 
@@ -51,11 +51,22 @@ pub(crate) struct Sweep {
     moves: Vec<f64>,
     /// For each pair, which two entries of `moves` add up to how far they can come closer.
     entries: Vec<[u32; 2]>,
-    /// The pairs, those that collided lately first: they are the likeliest to collide again.
-    order: Vec<u32>,
+    /// The pairs of each scope, those that collided lately first: they are the likeliest to collide again.
+    orders: Vec<Vec<u32>>,
     undecided: Vec<u32>,
     intervals: Vec<Interval>,
     q: Vec<f64>,
+}
+
+/// Which pairs count.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Scope {
+    /// Every pair.
+    All,
+    /// One moving arm with itself and with what does not move.
+    Own(usize),
+    /// Two arms that both move.
+    Between,
 }
 
 #[derive(Debug, Clone, Copy)]
@@ -72,8 +83,18 @@ fn width(arms: &[Reaches]) -> usize {
     arms.iter().flat_map(|arm| &arm.of_solids).map(Vec::len).max().unwrap_or(0) + 1
 }
 
+impl Scope {
+    fn index(self) -> usize {
+        match self {
+            Self::All => 0,
+            Self::Between => 1,
+            Self::Own(arm) => 2 + arm,
+        }
+    }
+}
+
 impl Sweep {
-    pub(crate) fn new(arms: Vec<Reaches>, solids: usize, pairs: &[Pair]) -> Self {
+    pub(crate) fn new(arms: Vec<Reaches>, solids: usize, pairs: &[Pair], frozen: &[usize]) -> Self {
         let (width, zero) = (width(&arms), solids * width(&arms));
         let owner = |solid: u32| {
             let index = solid as usize;
@@ -93,15 +114,19 @@ impl Sweep {
             }
         });
         debug_assert!(pairs.iter().all(|pair| pair.first != FLOOR), "the floor comes second");
-        Self {
-            entries: entries.collect(),
-            order: (0..pairs.len() as u32).collect(),
-            moves: vec![0.0; zero + 1],
-            arms,
-            undecided: Vec::new(),
-            intervals: Vec::new(),
-            q: Vec::new(),
+        let entries: Vec<[u32; 2]> = entries.collect();
+        let mut orders = vec![Vec::new(); arms.len() + 2];
+        for (index, pair) in pairs.iter().enumerate() {
+            let mover = |solid: u32| owner(solid).map(|(arm, _)| arm).filter(|arm| !frozen.contains(arm));
+            let scope = match (mover(pair.first), mover(pair.second)) {
+                (Some(one), Some(other)) if one != other => Scope::Between,
+                (Some(arm), _) | (None, Some(arm)) => Scope::Own(arm),
+                (None, None) => Scope::Between, // never: one side of every pair moves
+            };
+            orders[scope.index()].push(index as u32);
+            orders[Scope::All.index()].push(index as u32);
         }
+        Self { entries, orders, moves: vec![0.0; zero + 1], arms, undecided: Vec::new(), intervals: Vec::new(), q: Vec::new() }
     }
 
     /// Fills `moves` for the motion from `from` to `to`.
@@ -127,33 +152,40 @@ impl CollisionChecker<'_> {
     /// True means no sampled pair is closer than `margin`, and none is closer than half of it anywhere on the line, start
     /// included (with a margin too small for that, under about 2 mm: at samples 0.002 rad apart).
     pub fn edge_is_free(&mut self, from: &[f64], to: &[f64], margin: f64) -> bool {
-        self.edge_hit(from, to, margin).is_none()
+        self.edge_is_free_in(Scope::All, from, to, margin)
+    }
+
+    /// The same for some pairs only.
+    pub(crate) fn edge_is_free_in(&mut self, scope: Scope, from: &[f64], to: &[f64], margin: f64) -> bool {
+        self.edge_hit(scope, from, to, margin).is_none()
     }
 
     /// A pair that comes closer than `margin` (m) on the straight line, its start excepted, as it is where that was noticed.
     pub fn check_edge(&mut self, from: &[f64], to: &[f64], margin: f64) -> Option<CollisionPair> {
-        let pair = self.edge_hit(from, to, margin)?;
+        let pair = self.edge_hit(Scope::All, from, to, margin)?;
         Some(self.describe(pair))
     }
 
-    fn edge_hit(&mut self, from: &[f64], to: &[f64], margin: f64) -> Option<usize> {
+    fn edge_hit(&mut self, scope: Scope, from: &[f64], to: &[f64], margin: f64) -> Option<usize> {
         self.sweep.bound_moves(from, to);
+        let mut order = std::mem::take(&mut self.sweep.orders[scope.index()]);
         // Buffers leave `self` while pairs are judged and come back below; nothing in between can panic.
         let mut undecided = std::mem::take(&mut self.sweep.undecided);
         let mut intervals = std::mem::take(&mut self.sweep.intervals);
         let mut q = std::mem::take(&mut self.sweep.q);
-        let hit = self.sweep_intervals(from, to, margin, (&mut undecided, &mut intervals, &mut q));
+        let hit = self.sweep_intervals(&order, (from, to), margin, (&mut undecided, &mut intervals, &mut q));
         (self.sweep.undecided, self.sweep.intervals, self.sweep.q) = (undecided, intervals, q);
-        if let Some(place) = hit.and_then(|hit| self.sweep.order.iter().position(|&pair| pair as usize == hit)) {
-            self.sweep.order[..=place].rotate_right(1);
+        if let Some(place) = hit.and_then(|hit| order.iter().position(|&pair| pair as usize == hit)) {
+            order[..=place].rotate_right(1);
         }
+        self.sweep.orders[scope.index()] = order;
         hit
     }
 
     fn sweep_intervals(
         &mut self,
-        from: &[f64],
-        to: &[f64],
+        order: &[u32],
+        (from, to): (&[f64], &[f64]),
         margin: f64,
         (undecided, intervals, q): (&mut Vec<u32>, &mut Vec<Interval>, &mut Vec<f64>),
     ) -> Option<usize> {
@@ -164,16 +196,12 @@ impl CollisionChecker<'_> {
         };
         undecided.clear();
         intervals.clear();
-        // The end is a sample of its own: it proves what is far enough for the whole line, and fails soonest.
+        // The end is a sample of its own, and fails soonest.
         self.place(to);
-        for &pair in &self.sweep.order {
-            let index = pair as usize;
-            match self.nearness(index, margin, margin / 2.0 + closing(self, index)) {
-                Nearness::Hit => return Some(index),
-                Nearness::Near => undecided.push(pair),
-                Nearness::Clear => {}
-            }
+        if let Some(&hit) = order.iter().find(|&&pair| self.nearness(pair as usize, margin, margin) == Nearness::Hit) {
+            return Some(hit as usize);
         }
+        undecided.extend_from_slice(order);
         intervals.push(Interval { middle: 0.5, half: 0.5, first: 0, end: undecided.len() });
         let mut next = 0;
         while let Some(&Interval { middle, half, first, end }) = intervals.get(next) {
