@@ -26,12 +26,26 @@ pub struct OscGains {
     pub damping_ratio: f64,
     /// Null-space posture stiffness (1/s²), critically damped.
     pub posture_stiffness: f64,
-    /// Added to the diagonal of J M⁻¹ Jᵀ (1/kg) so that a singular arm stays bounded.
+    /// Added to the diagonal of J M⁻¹ Jᵀ (1/kg) at a singular pose, so that the arm stays bounded.
     pub singularity_damping: f64,
+    /// How near to a singular pose the damping begins, as 1 / tr (J M⁻¹ Jᵀ)⁻¹ (1/kg).
+    pub singularity_onset: f64,
     /// The position error that is acted on at most (m): a far target pulls no harder than this.
     pub max_position_error: f64,
     /// The rotation error that is acted on at most (rad).
     pub max_rotation_error: f64,
+}
+
+/// Rate at which speed beyond a joint's limit is taken away (1/s): within a few ticks, but not within one.
+const SPEED_LIMIT_DAMPING: f64 = 100.0;
+
+/// What an arm's joints can bear.
+#[derive(Debug, Clone)]
+pub struct JointLimits {
+    /// Largest torques (N·m).
+    pub torque: JointVector,
+    /// Largest speeds (rad/s).
+    pub velocity: JointVector,
 }
 
 /// What an arm is doing now.
@@ -69,12 +83,13 @@ pub fn pose_error(goal: &Pose, current: &Pose) -> Vector6<f64> {
     Vector6::new(linear.x, linear.y, linear.z, angular.x, angular.y, angular.z)
 }
 
-/// Joint torques (N·m) that drive the tool toward `goal`, saturated at `max_torque`.
+/// Joint torques (N·m) that drive the tool toward `goal`, within the joints' limits.
 ///
-/// τ = Jᵀ Λ (K e + D (v* − J q̇)) + Nᵀ M (k (q₀ − q) − d q̇) + h,  Λ = (J M⁻¹ Jᵀ + εI)⁻¹,  N = I − M⁻¹ Jᵀ Λ J
-/// (Khatib 1987). `e`, `v*` are linear then angular in the world frame. A singular arm is damped by ε.
-/// When a torque limit is met the whole task torque is scaled, so that the direction of the motion is kept.
-pub fn torques(gains: &OscGains, state: &ArmState, goal: &GripperGoal, max_torque: &JointVector) -> JointVector {
+/// τ = Jᵀ Λ (K e + D (v* − J q̇)) + Nᵀ M (k (q₀ − q) − d q̇) + h,  Λ = (J M⁻¹ Jᵀ)⁻¹,  N = I − M⁻¹ Jᵀ Λ J
+/// (Khatib 1987). `e`, `v*` are linear then angular in the world frame. Near a singular pose Λ is damped.
+/// A joint beyond its speed limit is slowed whatever the task wants. When a torque limit is met all but the bias is scaled
+/// together, so that the direction of the motion is kept.
+pub fn torques(gains: &OscGains, state: &ArmState, goal: &GripperGoal, limits: &JointLimits) -> JointVector {
     let mut error = pose_error(&goal.world_from_tool, &state.world_from_tool);
     clamp_norm(&mut error, 0, gains.max_position_error);
     clamp_norm(&mut error, 3, gains.max_rotation_error);
@@ -86,25 +101,40 @@ pub fn torques(gains: &OscGains, state: &ArmState, goal: &GripperGoal, max_torqu
     }
     let Some(factor) = state.mass.cholesky() else {
         // A mass matrix that is not positive definite can only come from a broken model; hold still against gravity.
-        return saturate(state.bias, max_torque);
+        return saturate(state.bias, &limits.torque);
     };
     let inverse_mass_jt = factor.solve(&state.jacobian.transpose()); // M⁻¹ Jᵀ, 7 x 6
-    let inverse_inertia = state.jacobian * inverse_mass_jt + Matrix6::identity() * gains.singularity_damping;
-    let inertia = inverse_inertia.try_inverse().unwrap_or_else(Matrix6::zeros);
+    let inertia = task_inertia(&(state.jacobian * inverse_mass_jt), gains);
     let task = state.jacobian.transpose() * (inertia * acceleration);
     let posture_acceleration =
         (goal.posture - state.q) * gains.posture_stiffness - state.qd * (2.0 * gains.posture_stiffness.sqrt());
     let posture = state.mass * posture_acceleration;
     // Nᵀ τ₀ = τ₀ − Jᵀ Λ J M⁻¹ τ₀
     let null = posture - state.jacobian.transpose() * (inertia * (inverse_mass_jt.transpose() * posture));
-    let wanted = task + null;
+    let excess = state.qd.zip_map(&limits.velocity, |speed, limit| speed - speed.clamp(-limit, limit));
+    let wanted = task + null - state.mass * excess * SPEED_LIMIT_DAMPING;
     let scale = (0..JOINTS)
         .map(|i| {
-            let room = max_torque[i] - state.bias[i].abs().min(max_torque[i]);
+            let room = limits.torque[i] - state.bias[i].abs().min(limits.torque[i]);
             if wanted[i].abs() > room { room / wanted[i].abs() } else { 1.0 }
         })
         .fold(1.0, f64::min);
-    saturate(wanted * scale + state.bias, max_torque)
+    saturate(wanted * scale + state.bias, &limits.torque)
+}
+
+/// Λ = (A + εI)⁻¹ of A = J M⁻¹ Jᵀ, where ε = ε₀ (1 − s/s₀)² for s < s₀ and 0 beyond; s = 1 / tr A⁻¹.
+///
+/// s lies between a sixth of the least eigenvalue of A and that eigenvalue: a well-conditioned arm is not damped at all.
+fn task_inertia(inverse_inertia: &Matrix6<f64>, gains: &OscGains) -> Matrix6<f64> {
+    let exact = inverse_inertia.cholesky().map(|factor| factor.inverse());
+    let distance = exact.map_or(0.0, |inertia| 1.0 / inertia.trace());
+    if let Some(inertia) = exact
+        && distance >= gains.singularity_onset
+    {
+        return inertia;
+    }
+    let damping = gains.singularity_damping * (1.0 - distance / gains.singularity_onset).powi(2);
+    (inverse_inertia + Matrix6::identity() * damping).cholesky().map_or_else(Matrix6::zeros, |factor| factor.inverse())
 }
 
 fn clamp_norm(error: &mut Vector6<f64>, from: usize, limit: f64) {

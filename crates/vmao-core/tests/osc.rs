@@ -3,7 +3,7 @@
 
 use nalgebra::{SMatrix, Vector3, Vector6};
 use vmao_core::geometry::{Pose, rotation_exp};
-use vmao_core::osc::{ArmState, GripperGoal, Jacobian, JointVector, MassMatrix, OscGains, pose_error, torques};
+use vmao_core::osc::{ArmState, GripperGoal, Jacobian, JointLimits, JointVector, MassMatrix, OscGains, pose_error, torques};
 use vmao_core::random::Stream;
 use vmao_core::robots::panda;
 
@@ -13,12 +13,18 @@ const GAINS: OscGains = OscGains {
     damping_ratio: 0.9,
     posture_stiffness: 100.0,
     singularity_damping: 0.0,
+    singularity_onset: 0.0,
     max_position_error: 0.05,
     max_rotation_error: 0.3,
 };
 
-fn unlimited() -> JointVector {
-    JointVector::repeat(1e12)
+fn unlimited() -> JointLimits {
+    limited(JointVector::repeat(1e12))
+}
+
+/// Torques limited, speeds not.
+fn limited(torque: JointVector) -> JointLimits {
+    JointLimits { torque, velocity: JointVector::repeat(1e12) }
 }
 
 fn random_vector(stream: &mut Stream, size: f64) -> JointVector {
@@ -107,7 +113,7 @@ fn saturation_keeps_the_limits_and_the_direction() {
         let state = ArmState { bias: random_vector(&mut stream, 10.0), ..arm(&mut stream) };
         let goal = near_goal(&state, &mut stream);
         let free = torques(&GAINS, &state, &goal, &unlimited()) - state.bias;
-        let torque = torques(&GAINS, &state, &goal, &limit);
+        let torque = torques(&GAINS, &state, &goal, &limited(limit));
         assert!(torque.iter().zip(&limit).all(|(torque, limit)| torque.abs() <= *limit), "{torque}");
         let kept = torque - state.bias;
         let cosine = kept.dot(&free) / (kept.norm() * free.norm());
@@ -126,13 +132,15 @@ fn a_bias_beyond_the_limits_is_cut_and_leaves_no_room() {
     let state = ArmState { bias: JointVector::repeat(100.0), ..arm(&mut stream) };
     let goal = near_goal(&state, &mut stream);
     let limit = JointVector::repeat(12.0);
-    assert_eq!(torques(&GAINS, &state, &goal, &limit), limit);
+    assert_eq!(torques(&GAINS, &state, &goal, &limited(limit)), limit);
 }
 
 #[test]
 fn a_singular_arm_stays_within_the_bound_of_its_damping() {
-    // ‖Jᵀ (J M⁻¹ Jᵀ + εI)⁻¹‖ ≤ √λ_max(M) / (2√ε), however singular J is.
-    let gains = OscGains { singularity_damping: 1e-3, posture_stiffness: 0.0, ..GAINS };
+    // ‖Jᵀ Λ‖ ≤ √λ_max(M) max(1/√ε₀, √(2/s₀)), however singular J is: with s < s₀/2 at least a quarter of ε₀ is added, and
+    // with s ≥ s₀/2 no eigenvalue is below it.
+    let (damping, onset) = (1e-3, 5e-3);
+    let gains = OscGains { singularity_damping: damping, singularity_onset: onset, posture_stiffness: 0.0, ..GAINS };
     let mut stream = Stream::new(6, &[]);
     let state = ArmState { qd: JointVector::zeros(), ..arm(&mut stream) };
     let goal = GripperGoal { twist: Vector6::repeat(1.0), ..near_goal(&state, &mut stream) };
@@ -141,11 +149,12 @@ fn a_singular_arm_stays_within_the_bound_of_its_damping() {
         let stiffness = if row < 3 { 400.0_f64 } else { 300.0 };
         stiffness * error[row] + 2.0 * 0.9 * stiffness.sqrt()
     });
-    let bound = state.mass.symmetric_eigenvalues().max().sqrt() / (2.0 * 1e-3_f64.sqrt()) * commanded.norm();
+    let worst = (1.0 / damping.sqrt()).max((2.0 / onset).sqrt());
+    let bound = state.mass.symmetric_eigenvalues().max().sqrt() * worst * commanded.norm();
     let mut largest_undamped: f64 = 0.0;
-    for exponent in 0..=12 {
+    for exponent in 0..=48 {
         let mut state = state.clone();
-        state.jacobian.row_mut(2).scale_mut(10_f64.powi(-exponent));
+        state.jacobian.row_mut(2).scale_mut(10_f64.powf(-0.25 * f64::from(exponent)));
         let torque = torques(&gains, &state, &goal, &unlimited()) - state.bias;
         assert!(torque.norm() <= bound, "{} above {bound} at 1e-{exponent}", torque.norm());
         let undamped = OscGains { singularity_damping: 0.0, ..gains };
@@ -158,7 +167,7 @@ fn a_singular_arm_stays_within_the_bound_of_its_damping() {
 fn torques_are_finite_for_half_turns_zero_errors_and_no_jacobian() {
     let mut stream = Stream::new(7, &[]);
     for damping in [0.0, 1e-3] {
-        let gains = OscGains { singularity_damping: damping, ..GAINS };
+        let gains = OscGains { singularity_damping: damping, singularity_onset: 5.0 * damping, ..GAINS };
         for turn in [Vector3::zeros(), Vector3::x(), Vector3::y(), Vector3::z(), Vector3::new(1.0, -1.0, 1.0).normalize()] {
             for still in [true, false] {
                 let mut state = arm(&mut stream);
@@ -168,7 +177,7 @@ fn torques_are_finite_for_half_turns_zero_errors_and_no_jacobian() {
                 let rotation = rotation_exp(&(turn * std::f64::consts::PI)) * state.world_from_tool.rotation;
                 let world_from_tool = Pose::from_parts(state.world_from_tool.translation, rotation);
                 let goal = GripperGoal { world_from_tool, twist: Vector6::zeros(), posture: state.q };
-                let torque = torques(&gains, &state, &goal, &JointVector::repeat(87.0));
+                let torque = torques(&gains, &state, &goal, &limited(JointVector::repeat(87.0)));
                 assert!(torque.iter().all(|torque| torque.is_finite() && torque.abs() <= 87.0), "{turn:?}: {torque}");
             }
         }
@@ -188,6 +197,25 @@ fn a_half_turn_is_acted_on_like_any_turn_beyond_the_largest() {
     };
     assert!((at(std::f64::consts::PI - 1e-6, 10.0) - at(0.3, 0.05)).amax() < 1e-6, "a far goal pulls harder than the largest");
     assert!((at(0.1, 0.01) - at(0.3, 0.05)).amax() > 1e-3, "near goals are not told apart");
+}
+
+#[test]
+fn a_joint_beyond_its_speed_limit_is_slowed_and_others_are_left_alone() {
+    let mut stream = Stream::new(10, &[]);
+    for _ in 0..50 {
+        let state = arm(&mut stream);
+        let goal = near_goal(&state, &mut stream);
+        let free = torques(&GAINS, &state, &goal, &unlimited());
+        let accelerated = |torque: &JointVector| state.mass.cholesky().unwrap().solve(&(torque - free));
+        let slow = JointLimits { velocity: state.qd.map(f64::abs) * 1.01, ..unlimited() };
+        assert_eq!(torques(&GAINS, &state, &goal, &slow), free, "nothing is too fast");
+        let mut velocity = state.qd.map(f64::abs) * 2.0;
+        velocity[3] /= 4.0;
+        let change = accelerated(&torques(&GAINS, &state, &goal, &JointLimits { velocity, ..unlimited() }));
+        assert!(change[3] * state.qd[3] < 0.0, "joint 4 is not slowed: {change}");
+        assert!((change[3].abs() - 50.0 * state.qd[3].abs()).abs() < 1e-6, "half its speed is to go: {change}");
+        assert!((0..7).all(|joint| joint == 3 || change[joint].abs() < 1e-6), "others are moved: {change}");
+    }
 }
 
 #[test]

@@ -98,13 +98,16 @@ fn the_sawyers_limits_are_the_published_ones() {
 #[test]
 fn the_sawyers_hand_in_neutral_points_down_where_the_maker_says() {
     let robot = sawyer(2);
-    let flange = robot.flange_chain().tool_pose(&robot.home);
+    let neutral = [0.0, -1.18, 0.0, 2.18, 0.0, 0.57, 3.3161];
+    let flange = robot.flange_chain().tool_pose(&neutral);
     assert!((flange.translation.vector - Vector3::new(0.4496, 0.1603, 0.2158)).amax() < 2e-4, "{flange}");
     assert!((flange.rotation * Vector3::z() + Vector3::z()).norm() < 2e-3, "the hand points down: {flange}");
-    let tool = robot.tool_chain().tool_pose(&robot.home);
+    let tool = robot.tool_chain().tool_pose(&neutral);
     assert!(((flange.translation.vector - tool.translation.vector).norm() - 0.109).abs() < 1e-12);
     assert!(flange.rotation.angle_to(&tool.rotation) < 1e-9, "the tool lies along the flange's axes");
-    assert!(robot.tool_chain().within_limits(&robot.home));
+    assert!(robot.tool_chain().within_limits(&neutral) && robot.tool_chain().within_limits(&robot.home));
+    let home = robot.tool_chain().tool_pose(&robot.home);
+    assert!((home.rotation * Vector3::z() + Vector3::z()).norm() < 2e-3, "the tool points down at home: {home}");
 }
 
 #[test]

@@ -20,7 +20,7 @@ pub(crate) fn assignments(scene: &Scene, held: &[(ArmId, PartId)], places: &[&[P
     };
     let keeps = |order: &[usize]| held.iter().all(|(arm, part)| order[usize::from(part.0)] == usize::from(arm.0));
     let mut ranked: Vec<(f64, Vec<usize>)> = Vec::new();
-    permutations(scene.object.parts.len(), &mut |order| {
+    arrangements(scene.robots.len(), scene.object.parts.len(), &mut |order| {
         if keeps(order) {
             ranked.push((order.iter().enumerate().map(|(part, &arm)| distance(arm, part)).sum(), order.to_vec()));
         }
@@ -31,21 +31,21 @@ pub(crate) fn assignments(scene: &Scene, held: &[(ArmId, PartId)], places: &[&[P
     ranked.into_iter().map(|(_, order)| order.into_iter().map(|arm| ArmId(arm as u16)).collect()).collect()
 }
 
-/// Calls `visit` with every order of `0..count`, in lexicographic order.
-fn permutations(count: usize, visit: &mut dyn FnMut(&[usize])) {
-    fn extend(chosen: &mut Vec<usize>, count: usize, visit: &mut dyn FnMut(&[usize])) {
-        if chosen.len() == count {
-            visit(chosen);
+/// Calls `visit` with every way to choose `places` of `0..count` in an order, lexicographically.
+fn arrangements(count: usize, places: usize, visit: &mut dyn FnMut(&[usize])) {
+    fn extend(chosen: &mut Vec<usize>, count: usize, places: usize, visit: &mut dyn FnMut(&[usize])) {
+        if chosen.len() == places {
+            return visit(chosen);
         }
         for next in 0..count {
             if !chosen.contains(&next) {
                 chosen.push(next);
-                extend(chosen, count, visit);
+                extend(chosen, count, places, visit);
                 chosen.pop();
             }
         }
     }
-    extend(&mut Vec::with_capacity(count), count, visit);
+    extend(&mut Vec::with_capacity(places), count, places, visit);
 }
 
 #[cfg(test)]
@@ -53,9 +53,12 @@ mod tests {
     use super::*;
 
     #[test]
-    fn permutations_come_once_each_in_order() {
+    fn arrangements_come_once_each_in_order() {
         let mut seen = Vec::new();
-        permutations(3, &mut |order| seen.push(order.to_vec()));
+        arrangements(3, 2, &mut |order| seen.push(order.to_vec()));
+        assert_eq!(seen, [[0, 1], [0, 2], [1, 0], [1, 2], [2, 0], [2, 1]], "an arm may be left over");
+        seen.clear();
+        arrangements(3, 3, &mut |order| seen.push(order.to_vec()));
         assert_eq!(seen, [[0, 1, 2], [0, 2, 1], [1, 0, 2], [1, 2, 0], [2, 0, 1], [2, 1, 0]]);
     }
 }

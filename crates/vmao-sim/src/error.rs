@@ -18,8 +18,14 @@ pub enum Error {
         /// What is wrong with it.
         cause: vmao_core::object_graph::GraphError,
     },
-    /// More or fewer arms than parts.
-    #[error("{arms} arms for {parts} parts of `{object}`; every part needs one arm")]
+    /// The arms cannot be placed so.
+    #[error("placement of the arms: {cause}")]
+    Placement {
+        /// What was found and what was expected.
+        cause: String,
+    },
+    /// Fewer arms than parts.
+    #[error("{arms} arms for {parts} parts of `{object}`; every part needs an arm of its own")]
     ArmCount {
         /// How many arms.
         arms: usize,

@@ -14,6 +14,7 @@ mod execution;
 mod exploration;
 mod failure;
 mod grasping;
+mod layout;
 mod mjcf;
 mod planning_world;
 mod recorder;
@@ -22,6 +23,7 @@ mod simulation;
 mod task;
 #[cfg(test)]
 mod tests;
+pub mod tracking;
 mod trial;
 
 pub use cameras::CameraConfig;
@@ -29,6 +31,7 @@ pub use error::Error;
 pub use execution::MotionConfig;
 pub use exploration::{LabelSet, Proposals, explore_round, scene_of_trial};
 pub use grasping::GraspConfig;
-pub use scene::{Friction, Layout, Scene, SceneConfig};
+pub use layout::{BasePlacement, Layout, MAX_ARMS};
+pub use scene::{Friction, Scene, SceneConfig};
 pub use task::{GoalConfig, StartConfig, Thresholds};
 pub use trial::{Recording, Trial, TrialConfig, run_trial};

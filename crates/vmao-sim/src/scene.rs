@@ -1,6 +1,7 @@
 //! A scene: arms around a table, one object, the compiled simulator model and who owns which of its geoms.
 
 use crate::error::Error;
+use crate::layout::{BasePlacement, Layout, Spacing, base_poses};
 use crate::mjcf;
 
 use mujoco_rs::wrappers::mj_model::{MjModel, MjtObjBase};
@@ -12,7 +13,7 @@ use vmao_core::contact::{ArmId, ContactTuple, PartId};
 use vmao_core::geometry::Pose;
 use vmao_core::object::ArticulatedObject;
 use vmao_core::object_graph::ObjectGraph;
-use vmao_core::osc::{JOINTS, JointVector};
+use vmao_core::osc::{JOINTS, JointLimits, JointVector};
 use vmao_core::robots::RobotModel;
 
 /// Coulomb friction coefficients of a surface. In a contact the larger of the two surfaces' values counts.
@@ -33,24 +34,18 @@ impl Friction {
     }
 }
 
-/// How the arms stand around the table.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum Layout {
-    /// Alternately on both long sides, facing each other.
-    Opposed,
-}
-
 /// Physics and placement of a scene.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct SceneConfig {
     /// How the arms stand.
     pub layout: Layout,
-    /// Distance of the bases from the table's centre line (m).
+    /// Distance of the bases from the table's centre line, or from its centre in a ring (m).
     pub base_distance: f64,
     /// Distance between neighbours on one side (m).
     pub base_spacing: f64,
+    /// Where the bases stand in the layout `explicit`; empty in all others.
+    pub bases: Vec<BasePlacement>,
     /// Simulated time per step (s).
     pub timestep: f64,
     /// MuJoCo's `impratio`: how much stiffer friction is than the normal direction.
@@ -88,7 +83,7 @@ pub(crate) struct ArmIndex {
     pub(crate) finger_qpos: usize,
     pub(crate) hand_body: usize,
     pub(crate) bodies: Vec<usize>,
-    pub(crate) max_torque: JointVector,
+    pub(crate) limits: JointLimits,
 }
 
 /// A compiled scene; shared by all trials that run on it.
@@ -125,16 +120,32 @@ pub struct Scene {
 }
 
 impl Scene {
-    /// Compiles the scene. Fails if the simulator refuses the model.
+    /// Compiles the scene. Fails if the arms are fewer than the parts or cannot be placed, or the simulator refuses the model.
     pub fn new(config: &SceneConfig, robots: Vec<RobotModel>, item: CatalogueItem) -> Result<Self, Error> {
+        if robots.len() < item.object.parts.len() {
+            return Err(Error::ArmCount { arms: robots.len(), parts: item.object.parts.len(), object: item.object.name });
+        }
+        let spacing = Spacing { distance: config.base_distance, between: config.base_spacing };
+        let world_from_bases = base_poses(config.layout, spacing, &config.bases, &robots)?;
+        Self::compile(config, robots, world_from_bases, item)
+    }
+
+    /// The object alone on the table: for what needs no arms.
+    #[cfg(test)]
+    pub(crate) fn without_arms(config: &SceneConfig, item: CatalogueItem) -> Result<Self, Error> {
+        Self::compile(config, Vec::new(), Vec::new(), item)
+    }
+
+    fn compile(
+        config: &SceneConfig,
+        robots: Vec<RobotModel>,
+        world_from_bases: Vec<Pose>,
+        item: CatalogueItem,
+    ) -> Result<Self, Error> {
         let hold_fingers = hold_fingers(&item);
         let hold_centers = hold_fingers.iter().map(|[a, b]| nalgebra::center(a, b)).collect();
         let CatalogueItem { object, demonstrations } = item;
         let graph = ObjectGraph::of(&object).map_err(|cause| Error::Object { name: object.name.clone(), cause })?;
-        if robots.len() != object.parts.len() {
-            return Err(Error::ArmCount { arms: robots.len(), parts: object.parts.len(), object: object.name });
-        }
-        let world_from_bases = base_poses(config, robots.len());
         let mjcf = mjcf::scene(config, &robots, &world_from_bases, &object);
         let model = MjModel::from_xml_string(&mjcf).map_err(|cause| Error::Model { cause: cause.to_string() })?;
         let arms = robots.iter().enumerate().map(|(arm, robot)| arm_index(&model, arm, robot)).collect::<Result<Vec<_>, _>>()?;
@@ -185,21 +196,6 @@ fn hold_fingers(item: &CatalogueItem) -> Vec<[Point3<f64>; 2]> {
     (0..item.object.parts.len()).map(|part| [mean(part, 0), mean(part, 1)]).collect()
 }
 
-/// Base poses of `count` arms; all face the table's centre.
-fn base_poses(config: &SceneConfig, count: usize) -> Vec<Pose> {
-    let Layout::Opposed = config.layout;
-    let sides = [count.div_ceil(2), count / 2];
-    (0..count)
-        .map(|arm| {
-            let (side, place) = (arm % 2, arm / 2);
-            let across = (place as f64 - (sides[side] as f64 - 1.0) / 2.0) * config.base_spacing;
-            let turn = if side == 0 { 0.0 } else { std::f64::consts::PI };
-            let x = if side == 0 { -config.base_distance } else { config.base_distance };
-            Pose::new(Vector3::new(x, across, 0.0), Vector3::z() * turn)
-        })
-        .collect()
-}
-
 fn id(model: &MjModel, kind: MjtObjBase, name: &str) -> Result<usize, Error> {
     model.name_to_id(kind, name).ok_or_else(|| Error::Model { cause: format!("the compiled model has no `{name}`") })
 }
@@ -235,7 +231,10 @@ fn arm_index(model: &MjModel, arm: usize, robot: &RobotModel) -> Result<ArmIndex
         finger_qpos,
         hand_body: id(model, MjtObjBase::mjOBJ_BODY, &mjcf::arm_name(arm, gripper.hand.name))?,
         bodies,
-        max_torque: JointVector::from_iterator(robot.joints.iter().map(|joint| joint.max_torque)),
+        limits: JointLimits {
+            torque: JointVector::from_iterator(robot.joints.iter().map(|joint| joint.max_torque)),
+            velocity: JointVector::from_iterator(robot.joints.iter().map(|joint| joint.max_velocity)),
+        },
     })
 }
 

@@ -15,7 +15,7 @@ use vmao_core::osc::{ArmState, GripperGoal, JointVector, OscGains, torques};
 pub(crate) enum Grip {
     /// Go to this gap between the pads (m).
     Open(f64),
-    /// Press with this share of the greatest force.
+    /// Press with this force on each pad (N), as far as the gripper can.
     Close(f64),
 }
 
@@ -87,7 +87,7 @@ impl<'s> Simulation<'s> {
         for arm in 0..self.scene.arms.len() {
             let state = self.arm_state(arm);
             let index = &self.scene.arms[arm];
-            let torque = torques(&self.gains, &state, &self.goals[arm], &index.max_torque);
+            let torque = torques(&self.gains, &state, &self.goals[arm], &index.limits);
             let drive = self.grip_force(arm);
             let ctrl = self.data.ctrl_mut();
             ctrl[index.ctrl..index.ctrl + 7].copy_from_slice(torque.as_slice());
@@ -111,7 +111,7 @@ impl<'s> Simulation<'s> {
                 let target = gripper.finger_travel(opening);
                 (OPENING_STIFFNESS * (target - self.data.qpos()[self.scene.arms[arm].finger_qpos])).clamp(-limit, limit)
             }
-            Grip::Close(share) => -share * limit,
+            Grip::Close(force) => -(2.0 * force).min(limit),
         }
     }
 

@@ -9,9 +9,11 @@ use crate::{
 };
 use serde::{Deserialize, Serialize};
 use std::path::Path;
-use vmao_core::{catalogue::InstanceSet, order::GraspOrder, osc::OscGains};
+use vmao_core::{catalogue::InstanceSet, order::GraspOrder, osc::OscGains, robots::SLOTS};
 use vmao_net::{NetworkConfig, TrainingConfig};
-use vmao_sim::{CameraConfig, GoalConfig, GraspConfig, MotionConfig, SceneConfig, StartConfig, Thresholds, TrialConfig};
+use vmao_sim::{
+    CameraConfig, GoalConfig, GraspConfig, MAX_ARMS, MotionConfig, SceneConfig, StartConfig, Thresholds, TrialConfig,
+};
 
 /// The configuration shipped with the program.
 pub const SHIPPED: &str = include_str!("../../../configs/demo.toml");
@@ -76,6 +78,8 @@ pub struct ObjectConfig {
 pub struct RobotsConfig {
     /// One arm each.
     pub names: Vec<String>,
+    /// Slot that the fingers of Sawyers' grippers are screwed to.
+    pub sawyer_slot: u8,
 }
 
 /// How a trial goes.
@@ -167,7 +171,16 @@ impl Config {
     fn check(&self) -> Result<(), String> {
         let Self { object, robots, scene, start, goal, thresholds, cameras, grasp, motion, osc, explore, evaluate, .. } = self;
         ensure(!object.name.is_empty(), "object.name", "an empty name", "a name of the catalogue")?;
-        ensure(!robots.names.is_empty(), "robots.names", "no arms", "at least one")?;
+        let arms = robots.names.len();
+        ensure((1..=MAX_ARMS).contains(&arms), "robots.names", &format!("{arms} arms"), &format!("1 to {MAX_ARMS}"))?;
+        within("robots.sawyer_slot", robots.sawyer_slot.into(), (*SLOTS.start()).into(), (*SLOTS.end()).into())?;
+        ensure(scene.bases.len() <= MAX_ARMS, "scene.bases", &scene.bases.len().to_string(), &format!("at most {MAX_ARMS}"))?;
+        for base in &scene.bases {
+            for value in base.position {
+                within("scene.bases.position", value, -10.0, 10.0)?;
+            }
+            within("scene.bases.yaw_deg", base.yaw_deg, -360.0, 360.0)?;
+        }
         within("scene.base_distance", scene.base_distance, 0.2, 2.0)?;
         within("scene.base_spacing", scene.base_spacing, 0.2, 2.0)?;
         within("scene.timestep", scene.timestep, 1e-4, 5e-3)?;
@@ -237,7 +250,7 @@ fn check_control(grasp: &GraspConfig, motion: &MotionConfig, osc: &OscGains) -> 
     within("grasp.carry_margin", grasp.carry_margin, 0.0, 0.1)?;
     within("grasp.shortlist", grasp.shortlist as f64, 1.0, 1000.0)?;
     within("grasp.ik_candidates", grasp.ik_candidates as f64, 1.0, 100.0)?;
-    within("grasp.closing_share", grasp.closing_share, 0.0, 1.0)?;
+    within("grasp.closing_force", grasp.closing_force, 0.0, 200.0)?;
     within("grasp.closing_seconds", grasp.closing_seconds, 0.0, 10.0)?;
     within("grasp.hold_force", grasp.hold_force, 0.0, 1000.0)?;
     within("motion.velocity_share", motion.velocity_share, 0.01, 1.0)?;
@@ -253,6 +266,7 @@ fn check_control(grasp: &GraspConfig, motion: &MotionConfig, osc: &OscGains) -> 
     positive("osc.damping_ratio", osc.damping_ratio)?;
     within("osc.posture_stiffness", osc.posture_stiffness, 0.0, 1e4)?;
     within("osc.singularity_damping", osc.singularity_damping, 0.0, 1.0)?;
+    within("osc.singularity_onset", osc.singularity_onset, 0.0, 1.0)?;
     positive("osc.max_position_error", osc.max_position_error)?;
     positive("osc.max_rotation_error", osc.max_rotation_error)
 }

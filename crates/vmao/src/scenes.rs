@@ -4,8 +4,8 @@ use crate::config::Config;
 use crate::failure::Failure;
 use crate::wording::unknown;
 use vmao_core::catalogue::{self, CatalogueItem, INSTANCES, InstanceSet};
-use vmao_core::robots::RobotModel;
-use vmao_sim::Scene;
+use vmao_core::robots::{RobotModel, sawyer};
+use vmao_sim::{Error, Scene};
 
 /// The configured object in every size of `set`. An unknown name is bad input.
 pub fn items(config: &Config, set: InstanceSet) -> Result<Vec<CatalogueItem>, Failure> {
@@ -17,17 +17,22 @@ pub fn items(config: &Config, set: InstanceSet) -> Result<Vec<CatalogueItem>, Fa
 
 /// Compiles the configured scene for every size in `set`. Unknown names and too few or many arms are bad input.
 pub fn scenes(config: &Config, set: InstanceSet) -> Result<Vec<Scene>, Failure> {
-    let robot = |name: &String| {
-        RobotModel::named(name).ok_or_else(|| Failure::bad_input(unknown("the program", "robot", name, RobotModel::NAMES)))
+    let robot = |name: &String| match name.as_str() {
+        "sawyer" => Ok(sawyer(config.robots.sawyer_slot)),
+        _ => RobotModel::named(name).ok_or_else(|| Failure::bad_input(unknown("the program", "robot", name, RobotModel::NAMES))),
     };
     let robots = config.robots.names.iter().map(robot).collect::<Result<Vec<_>, _>>()?;
     let compile = |item: CatalogueItem| {
         let (arms, parts) = (robots.len(), item.object.parts.len());
-        if arms != parts {
-            let message = format!("robots.names: {arms} arms, expected {parts}: one for each part of `{}`", item.object.name);
+        if arms < parts {
+            let object = &item.object.name;
+            let message = format!("robots.names: {arms} arms, expected at least {parts}: one for each part of `{object}`");
             return Err(Failure::bad_input(message));
         }
-        Ok(Scene::new(&config.scene, robots.clone(), item)?)
+        Scene::new(&config.scene, robots.clone(), item).map_err(|error| match error {
+            Error::Placement { cause } => Failure::bad_input(format!("scene.layout: {cause}")),
+            other => other.into(),
+        })
     };
     items(config, set)?.into_iter().map(compile).collect()
 }

@@ -71,7 +71,8 @@ pub fn sawyer(slot: u8) -> RobotModel {
         joints: links().into_iter().enumerate().map(joint).collect(),
         last_from_flange,
         gripper: gripper(&last_from_flange, slot.clamp(*SLOTS.start(), *SLOTS.end())),
-        home: vec![0.0, -1.18, 0.0, 2.18, 0.0, 0.57, 3.3161],
+        // Like the published neutral pose, but higher and further back, so that nobody's view or way is blocked.
+        home: vec![0.0, -1.83, 0.0, 1.86, 0.0, 1.5408, 1.7453],
     }
 }
 

@@ -1,9 +1,10 @@
 //! Our kinematics against the simulator's, which knows nothing of ours but the written scene.
 
 use super::settled;
-use super::support::scene;
+use super::support::{mixed_scene, scene};
 use crate::convention::{Data, body_pose, free_joint_position, hinge_jacobian};
-use crate::scene::Scene;
+use crate::scene::{Owner, Scene};
+use crate::simulation::Grip;
 use mujoco_rs::wrappers::mj_model::MjtObjBase;
 use nalgebra::{Matrix3, Vector3};
 use vmao_core::contact::PartId;
@@ -28,7 +29,7 @@ fn set_arms(scene: &Scene, data: &mut Data, q: &[Vec<f64>]) {
 
 #[test]
 fn chains_and_jacobians_are_the_simulators_on_random_configurations() {
-    let scene = scene(0);
+    let scene = mixed_scene();
     let mut data = Data::new(scene.model.clone());
     let nv = data.qvel().len();
     let mut stream = Stream::new(11, &[]);
@@ -63,7 +64,7 @@ fn chains_and_jacobians_are_the_simulators_on_random_configurations() {
 
 #[test]
 fn the_compiled_arm_has_the_robots_limits_and_inertias() {
-    let scene = scene(0);
+    let scene = mixed_scene();
     let model = &scene.model;
     for (arm, robot) in scene.arms.iter().zip(&scene.robots) {
         for (&id, joint) in arm.joints.iter().zip(&robot.joints) {
@@ -83,6 +84,27 @@ fn the_compiled_arm_has_the_robots_limits_and_inertias() {
             assert!((inertia - link.inertial.inertia).amax() < 1e-6, "{}: {inertia} {}", link.name, link.inertial.inertia);
         }
     }
+}
+
+#[test]
+fn arms_at_home_touch_nothing_and_their_fingers_move_together() {
+    let scene = mixed_scene();
+    let mut simulation = settled(&scene, 2);
+    for arm in 0..2 {
+        let gripper = &scene.robots[arm].gripper;
+        for opening in [gripper.closed_gap, gripper.max_opening(), 0.5 * (gripper.closed_gap + gripper.max_opening())] {
+            simulation.grips[arm] = Grip::Open(opening);
+            simulation.wait(1.0);
+            assert!((simulation.opening(arm) - opening).abs() < 1e-3, "{opening} m asked, {} m", simulation.opening(arm));
+            let at = scene.arms[arm].finger_qpos;
+            let [first, second] = [simulation.data.qpos()[at], simulation.data.qpos()[at + 1]];
+            assert!((first - second).abs() < 2e-4, "arm {arm}: one finger at {first} m, the other at {second} m");
+        }
+    }
+    let owners = |geoms: [i32; 2]| geoms.map(|geom| scene.owners[geom as usize]);
+    let of_arm = |owner: &Owner| matches!(owner, Owner::Link(_) | Owner::Pad(..));
+    let touching: Vec<_> = simulation.data.contact().iter().map(|contact| owners(contact.geom)).collect();
+    assert!(!touching.iter().flatten().any(of_arm), "{touching:?}");
 }
 
 #[test]

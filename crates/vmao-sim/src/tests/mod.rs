@@ -1,6 +1,7 @@
 //! Tests that look inside a running simulation. Those that need only the public interface are in `tests/`.
 
 mod cameras;
+mod catalogue;
 mod control;
 mod kinematics;
 #[path = "../../tests/support/mod.rs"]

@@ -9,7 +9,7 @@ use vmao_core::order::GraspOrder;
 use vmao_core::osc::OscGains;
 use vmao_core::outcome::{FailureStage, TrialOutcome};
 use vmao_core::random::Stream;
-use vmao_core::robots::panda;
+use vmao_core::robots::{DEFAULT_SLOT, panda, sawyer};
 use vmao_sim::{
     CameraConfig, Friction, GoalConfig, GraspConfig, MotionConfig, Recording, Scene, SceneConfig, StartConfig, Thresholds, Trial,
     TrialConfig, run_trial,
@@ -45,6 +45,11 @@ pub(crate) fn scene_with(config: &SceneConfig, instance: u16) -> Scene {
 
 pub(crate) fn scene(instance: u16) -> Scene {
     scene_with(&configuration().0, instance)
+}
+
+/// A Panda and a Sawyer opposite each other, and the pliers in their first training size.
+pub(crate) fn mixed_scene() -> Scene {
+    Scene::new(&configuration().0, vec![panda(), sawyer(DEFAULT_SLOT)], item("pliers", InstanceSet::Train, 0).unwrap()).unwrap()
 }
 
 /// All sliding friction of the scene at `sliding`.

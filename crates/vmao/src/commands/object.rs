@@ -1,11 +1,15 @@
 //! `vmao object list` and `vmao object show NAME`: the catalogue.
 
 use super::{CommonOptions, Session};
-use crate::{failure::Failure, wording::unknown};
-use serde_json::{Value, json};
-use vmao_core::catalogue::{self, INSTANCES, InstanceSet};
+use crate::{
+    failure::Failure,
+    wording::{quoted, unknown},
+};
+use serde_json::{Map, Value, json};
+use vmao_core::catalogue::{self, CatalogueItem, INSTANCES, InstanceSet, widths_held};
 use vmao_core::contact::PartId;
 use vmao_core::object_graph::ObjectGraph;
+use vmao_core::robots::RobotModel;
 
 #[derive(Debug, clap::Args)]
 pub(super) struct ObjectArguments {
@@ -70,5 +74,38 @@ fn description(name: &str) -> Result<Value, Failure> {
         "root": part(PartId(0)),
         "dependencies": dependencies,
         "demonstrations": item.demonstrations.len(),
+        "grippers": grippers(name),
     }))
+}
+
+/// For each robot: of how many sizes its gripper can hold every part, and why not of the others.
+fn grippers(name: &str) -> Map<String, Value> {
+    let sets = [("train", InstanceSet::Train), ("held-out", InstanceSet::HeldOut)].into_iter();
+    let numbered =
+        sets.flat_map(|(label, set)| (0..INSTANCES).map(move |instance| (format!("{label} {instance}"), set, instance)));
+    let sizes: Vec<(String, CatalogueItem)> =
+        numbered.filter_map(|(label, set, instance)| Some((label, catalogue::item(name, set, instance)?))).collect();
+    let robots = RobotModel::NAMES.into_iter().filter_map(RobotModel::named);
+    robots.map(|robot| (robot.name.to_owned(), suits(&robot, &sizes))).collect()
+}
+
+fn suits(robot: &RobotModel, sizes: &[(String, CatalogueItem)]) -> Value {
+    let millimetres = |metres: f64| (metres * 1e4).round() / 10.0;
+    let [least, greatest] = widths_held(&robot.gripper).map(millimetres);
+    let mut refused = Vec::new();
+    for (label, item) in sizes {
+        let reasons: Vec<String> = item
+            .misfits(&robot.gripper)
+            .iter()
+            .map(|misfit| {
+                let part = quoted(&item.object.parts[usize::from(misfit.part.0)].name);
+                let [narrow, wide] = misfit.widths.map(millimetres);
+                format!("part {part} is {narrow} to {wide} mm wide where it is held, the gripper takes {least} to {greatest} mm")
+            })
+            .collect();
+        if !reasons.is_empty() {
+            refused.push(json!({ "size": label, "reasons": reasons }));
+        }
+    }
+    json!({ "sizes_held": sizes.len() - refused.len(), "sizes": sizes.len(), "refused": refused })
 }
