@@ -3,6 +3,7 @@
 use crate::convention::{inertial_element, pose_attributes, shape_attributes};
 use crate::scene::SceneConfig;
 use std::fmt::Write;
+use vmao_core::collision::Obstacle;
 use vmao_core::contact::PartId;
 use vmao_core::geometry::Pose;
 use vmao_core::object::{ArticulatedObject, Joint, JointKind};
@@ -40,6 +41,23 @@ pub(crate) fn scene(config: &SceneConfig, robots: &[RobotModel], bases: &[Pose],
     exclusions(&mut xml, robots);
     couplings(&mut xml, robots.len());
     actuators(&mut xml, robots);
+    line(&mut xml, "</mujoco>");
+    xml
+}
+
+/// Arms among obstacles that do not move, and nothing else.
+pub(crate) fn arms_among(config: &SceneConfig, robots: &[RobotModel], bases: &[Pose], obstacles: &[Obstacle]) -> String {
+    let mut xml = String::new();
+    header(&mut xml, config);
+    line(&mut xml, "<worldbody>");
+    for (index, obstacle) in obstacles.iter().enumerate() {
+        solid_geom(&mut xml, &format!("obstacle{index}"), &obstacle.solid, "");
+    }
+    for (arm, (robot, base)) in robots.iter().zip(bases).enumerate() {
+        arm_body(&mut xml, config, arm, robot, base);
+    }
+    line(&mut xml, "</worldbody>");
+    exclusions(&mut xml, robots);
     line(&mut xml, "</mujoco>");
     xml
 }
