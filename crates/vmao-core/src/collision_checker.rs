@@ -4,10 +4,14 @@ use crate::{
     collision::{ArmCollisionModel, Collider, CollisionPair, CollisionWorld, LinkSolid},
     distance::{Convex, Nearness},
     geometry::Pose,
+    shape::Shape,
     swept::{Reaches, Sweep},
 };
-use nalgebra::{Matrix3, Vector3};
+use nalgebra::{Matrix3, UnitQuaternion, Vector3};
+use std::ops::Range;
 
+/// Stands where a ball around several solids is no solid itself.
+const NO_SOLID: u32 = u32::MAX;
 /// Stands for the floor where a pair names its second solid.
 pub(crate) const FLOOR: u32 = u32::MAX;
 
@@ -22,13 +26,17 @@ pub struct CollisionChecker<'a> {
     placed: Vec<Convex>,
     /// Their centres, close together for the first rejection.
     centers: Vec<Vector3<f64>>,
+    /// The pairs of solids, bunch after bunch, then the pairs of the bunches.
     pub(crate) pairs: Vec<Pair>,
+    pub(crate) bunches: Vec<Bunch>,
     /// Everything below is solid (m).
     floor: f64,
     /// The angles of the last query: arms that have not moved since are not placed again.
     posed: Vec<f64>,
-    /// Rotation and origin in the world of the base and of every link of the arm placed last.
-    links: Vec<(Matrix3<f64>, Vector3<f64>)>,
+    /// The arm and the link that each solid rides on; obstacles have none.
+    carriers: Vec<Option<(usize, usize)>>,
+    /// For each solid the count of its arm's poses when it was placed.
+    placed_at: Vec<u64>,
     pub(crate) sweep: Sweep,
 }
 
@@ -41,15 +49,25 @@ pub(crate) struct Pair {
     reach: f64,
 }
 
+/// Pairs whose solids ride on the same two links: while the balls around the links are apart, so are they.
+#[derive(Debug, Clone)]
+pub(crate) struct Bunch {
+    /// Index of the pair of balls; a link with one solid and an obstacle are their own balls.
+    pub(crate) balls: usize,
+    /// Indices of the pairs.
+    pub(crate) members: Range<usize>,
+}
+
 /// The fixed transforms of an arm's kinematics and where its joints and solids are in the flat lists.
 #[derive(Debug, Clone)]
 struct Arm {
     base: (Matrix3<f64>, Vector3<f64>),
     parent_from_joints: Vec<(Matrix3<f64>, Vector3<f64>)>,
     first_joint: usize,
-    first_slot: usize,
-    /// The link that each of its solids rides on.
-    carriers: Vec<usize>,
+    /// Rotation and origin in the world of the base and of every link, at the last query.
+    links: Vec<(Matrix3<f64>, Vector3<f64>)>,
+    /// How many poses it has had.
+    poses: u64,
 }
 
 impl<'a> CollisionChecker<'a> {
@@ -63,6 +81,9 @@ impl<'a> CollisionChecker<'a> {
     /// So arms at rest may stay in the contact they have, such as two grippers on one object.
     pub fn with_frozen(world: &'a CollisionWorld, frozen: &[usize]) -> Self {
         let (mut local, mut arms, mut first_joint) = (Vec::new(), Vec::new(), 0);
+        // for every solid the ball of its bunch and what it rides on
+        let (mut balls, mut carriers): (Vec<u32>, Vec<Option<(usize, usize)>>) = (Vec::new(), Vec::new());
+        let mut reaches = Vec::new();
         for (index, model) in world.arms.iter().enumerate() {
             let first_slot = local.len();
             for LinkSolid { link, solid } in &model.solids {
@@ -71,49 +92,88 @@ impl<'a> CollisionChecker<'a> {
             for solid in world.attached.get(index).into_iter().flatten() {
                 local.push((Collider::Held { arm: index }, Convex::new(&solid.shape, &solid.carrier_from_solid)));
             }
-            let carrier = |&(collider, _): &(Collider, Convex)| match collider {
-                Collider::Link { link, .. } => link.min(model.chain.len()),
-                _ => model.chain.len(),
-            };
-            let carriers = local[first_slot..].iter().map(carrier).collect();
-            arms.push(Arm::new(model, first_joint, first_slot, carriers));
+            let solids = local.len();
+            balls.extend(first_slot as u32..solids as u32);
+            carriers.extend(local[first_slot..].iter().map(|(collider, _)| match *collider {
+                Collider::Link { link, .. } => Some((index, link.min(model.chain.len()))),
+                _ => Some((index, model.chain.len())),
+            }));
+            for link in 0..=model.chain.len() {
+                let own: Vec<usize> = (first_slot..solids).filter(|&slot| carriers[slot] == Some((index, link))).collect();
+                if own.len() > 1 {
+                    own.iter().for_each(|&slot| balls[slot] = local.len() as u32);
+                    balls.push(NO_SOLID);
+                    carriers.push(Some((index, link)));
+                    local.push((Collider::Link { arm: index, link }, ball_around(own.iter().map(|&slot| &local[slot].1))));
+                }
+            }
+            let arm = Arm::new(model, first_joint);
+            let riders = local[first_slot..].iter().zip(&carriers[first_slot..]);
+            let riders = riders.filter_map(|(&(_, convex), carrier)| Some((carrier.as_ref()?.1, convex)));
+            reaches.push(Reaches::new(&arm.parent_from_joints, first_joint, first_slot, riders));
+            arms.push(arm);
             first_joint += model.chain.len();
         }
         for (index, obstacle) in world.obstacles.iter().enumerate() {
             let convex = Convex::new(&obstacle.solid.shape, &obstacle.solid.carrier_from_solid);
+            balls.push(local.len() as u32);
+            carriers.push(None);
             local.push((Collider::Obstacle(index), convex));
         }
-        let pairs = pairs(world, &local, frozen);
+        let mut pairs = pairs(world, &local, &balls, frozen);
+        let bunches = bunches(&mut pairs, &local, &balls);
         let placed = local.iter().map(|&(_, convex)| convex).collect();
         let centers = local.iter().map(|(_, convex)| *convex.center()).collect();
-        let reaches = arms.iter().map(|arm| {
-            let solids = local[arm.first_slot..].iter().zip(&arm.carriers).map(|(&(_, convex), &link)| (link, convex));
-            Reaches::new(&arm.parent_from_joints, arm.first_joint, arm.first_slot, solids)
-        });
-        let sweep = Sweep::new(reaches.collect(), local.len(), &pairs, frozen);
+        let sweep = Sweep::new(reaches, local.len(), &pairs, &bunches, frozen);
         let floor = world.floor_height.unwrap_or(f64::NEG_INFINITY);
         let posed = vec![f64::NAN; world.joint_count()];
-        Self { world, arms, local, placed, centers, pairs, floor, posed, links: Vec::new(), sweep }
+        Self {
+            world,
+            arms,
+            local,
+            placed,
+            centers,
+            pairs,
+            bunches,
+            floor,
+            posed,
+            placed_at: vec![0; carriers.len()],
+            carriers,
+            sweep,
+        }
     }
 
     /// The first pair closer than `margin` (m) at the angles `q` (flat, arm after arm), `None` if all are clear.
     pub fn check(&mut self, q: &[f64], margin: f64) -> Option<CollisionPair> {
         self.place(q);
-        let pair = (0..self.pairs.len()).find(|&pair| self.nearness(pair, margin, margin) == Nearness::Hit)?;
+        let pair = self.bunches.iter().find_map(|bunch| self.hit_in(bunch, margin))?;
         Some(self.describe(pair))
     }
 
     /// Whether no pair is closer than `margin` (m) at the angles `q`.
     pub fn is_free(&mut self, q: &[f64], margin: f64) -> bool {
         self.place(q);
-        (0..self.pairs.len()).all(|pair| self.nearness(pair, margin, margin) != Nearness::Hit)
+        self.bunches.iter().all(|bunch| self.hit_in(bunch, margin).is_none())
+    }
+
+    /// The first pair of a bunch that is closer than `margin` as placed now.
+    pub(crate) fn hit_in(&self, bunch: &Bunch, margin: f64) -> Option<usize> {
+        if self.is_clear(bunch, margin, margin) {
+            return None;
+        }
+        bunch.members.clone().find(|&pair| self.nearness(pair, margin, margin) == Nearness::Hit)
+    }
+
+    /// Whether the balls of a bunch show that all its pairs are at least `enough` apart as placed now.
+    pub(crate) fn is_clear(&self, bunch: &Bunch, margin: f64, enough: f64) -> bool {
+        bunch.members.len() > 1 && self.nearness(bunch.balls, margin, enough) == Nearness::Clear
     }
 
     /// The least signed distance over all compared pairs (m) at the angles `q`, +∞ if there is no pair.
     pub fn clearance(&mut self, q: &[f64]) -> f64 {
         self.place(q);
         let mut least = f64::INFINITY;
-        for pair in &self.pairs {
+        for pair in &self.pairs[..self.pairs.len() - self.bunches.len()] {
             if self.gap_of_balls(pair) < least {
                 least = least.min(self.distance(pair));
             }
@@ -178,63 +238,115 @@ impl<'a> CollisionChecker<'a> {
 
     /// Puts every solid of every arm where `q` has it.
     pub(crate) fn place(&mut self, q: &[f64]) {
+        self.pose(q);
+        (0..self.local.len()).for_each(|slot| self.place_solid(slot));
+    }
+
+    /// Puts the links where `q` has them; solids follow when they are placed.
+    pub(crate) fn pose(&mut self, q: &[f64]) {
         assert_eq!(q.len(), self.posed.len(), "one angle per joint of all arms");
-        for arm in &self.arms {
+        for arm in &mut self.arms {
             let joints = arm.first_joint..arm.first_joint + arm.parent_from_joints.len();
-            if !joints.is_empty() && q[joints.clone()] == self.posed[joints.clone()] {
-                continue;
-            }
-            arm.links(&q[joints], &mut self.links);
-            for (slot, &link) in (arm.first_slot..).zip(&arm.carriers) {
-                let (rotation, origin) = &self.links[link];
-                self.placed[slot].place(&self.local[slot].1, rotation, origin);
-                self.centers[slot] = *self.placed[slot].center();
+            if arm.poses == 0 || q[joints.clone()] != self.posed[joints.clone()] {
+                arm.pose(&q[joints]);
             }
         }
         self.posed.copy_from_slice(q);
     }
+
+    /// Places a solid where its link is now.
+    pub(crate) fn place_solid(&mut self, slot: usize) {
+        let Some((arm, link)) = self.carriers[slot] else { return };
+        let arm = &self.arms[arm];
+        if self.placed_at[slot] != arm.poses {
+            let (rotation, origin) = &arm.links[link];
+            self.placed[slot].place(&self.local[slot].1, rotation, origin);
+            self.centers[slot] = *self.placed[slot].center();
+            self.placed_at[slot] = arm.poses;
+        }
+    }
 }
 
 impl Arm {
-    fn new(model: &ArmCollisionModel, first_joint: usize, first_slot: usize, carriers: Vec<usize>) -> Self {
+    fn new(model: &ArmCollisionModel, first_joint: usize) -> Self {
         let split = |pose: &Pose| (*pose.rotation.to_rotation_matrix().matrix(), pose.translation.vector);
         let parent_from_joints = model.chain.joints.iter().map(|joint| split(&joint.parent_from_joint)).collect();
-        Self { base: split(&model.world_from_base), parent_from_joints, first_joint, first_slot, carriers }
+        Self { base: split(&model.world_from_base), parent_from_joints, first_joint, links: Vec::new(), poses: 0 }
     }
 
-    /// Rotation and origin in the world of the base and of every link.
-    fn links(&self, q: &[f64], links: &mut Vec<(Matrix3<f64>, Vector3<f64>)>) {
-        links.clear();
+    fn pose(&mut self, q: &[f64]) {
+        self.poses += 1;
+        self.links.clear();
         let (mut rotation, mut origin) = self.base;
-        links.push((rotation, origin));
+        self.links.push((rotation, origin));
         for ((turn, shift), angle) in self.parent_from_joints.iter().zip(q) {
             origin += rotation * shift;
             let before = rotation * turn;
             let (sine, cosine) = angle.sin_cos();
             let (x, y) = (before.column(0), before.column(1));
             rotation = Matrix3::from_columns(&[x * cosine + y * sine, y * cosine - x * sine, before.column(2).into_owned()]);
-            links.push((rotation, origin));
+            self.links.push((rotation, origin));
         }
     }
 }
 
+/// A ball that holds all these solids of one link.
+fn ball_around<'c>(solids: impl Iterator<Item = &'c Convex> + Clone) -> Convex {
+    let (mut low, mut high) = (Vector3::repeat(f64::INFINITY), Vector3::repeat(f64::NEG_INFINITY));
+    for solid in solids.clone() {
+        low = low.inf(&solid.center().add_scalar(-solid.bound()));
+        high = high.sup(&solid.center().add_scalar(solid.bound()));
+    }
+    let center = (low + high) / 2.0;
+    let radius = solids.map(|solid| (solid.center() - center).norm() + solid.bound()).fold(0.0, f64::max);
+    Convex::new(&Shape::Sphere { radius }, &Pose::from_parts(center.into(), UnitQuaternion::identity()))
+}
+
 /// All pairs that can collide, at least one side of which moves.
-fn pairs(world: &CollisionWorld, local: &[(Collider, Convex)], frozen: &[usize]) -> Vec<Pair> {
+fn pairs(world: &CollisionWorld, local: &[(Collider, Convex)], balls: &[u32], frozen: &[usize]) -> Vec<Pair> {
     let moves = |collider: Collider| match collider {
         Collider::Link { arm, link } => link > 0 && !frozen.contains(&arm),
         Collider::Held { arm } => !frozen.contains(&arm),
         Collider::Obstacle(_) | Collider::Floor => false,
     };
+    let solids: Vec<usize> = (0..local.len()).filter(|&slot| balls[slot] != NO_SOLID).collect();
     let mut pairs = Vec::new();
-    for (i, &(first, convex)) in local.iter().enumerate() {
+    for (place, &i) in solids.iter().enumerate() {
+        let first = local[i].0;
         if world.floor_height.is_some() && world.compares(first, Collider::Floor) && moves(first) {
-            pairs.push(Pair { first: i as u32, second: FLOOR, reach: convex.bound() });
+            pairs.push(Pair::new(local, i as u32, FLOOR));
         }
-        for (j, &(second, other)) in local.iter().enumerate().skip(i + 1) {
+        for &j in &solids[place + 1..] {
+            let second = local[j].0;
             if world.compares(first, second) && (moves(first) || moves(second)) {
-                pairs.push(Pair { first: i as u32, second: j as u32, reach: convex.bound() + other.bound() });
+                pairs.push(Pair::new(local, i as u32, j as u32));
             }
         }
     }
     pairs
+}
+
+/// Sorts the pairs into bunches and appends the pairs of their balls.
+fn bunches(pairs: &mut Vec<Pair>, local: &[(Collider, Convex)], balls: &[u32]) -> Vec<Bunch> {
+    let ball = |solid: u32| if solid == FLOOR { FLOOR } else { balls[solid as usize] };
+    let key = |pair: &Pair| (ball(pair.first), ball(pair.second));
+    pairs.sort_by_key(key);
+    let mut bunches: Vec<Bunch> = Vec::new();
+    let mut first = 0;
+    for bunch in pairs.chunk_by(|a, b| key(a) == key(b)) {
+        bunches.push(Bunch { balls: pairs.len() + bunches.len(), members: first..first + bunch.len() });
+        first += bunch.len();
+    }
+    for bunch in &bunches {
+        let (first, second) = key(&pairs[bunch.members.start]);
+        pairs.push(Pair::new(local, first, second));
+    }
+    bunches
+}
+
+impl Pair {
+    fn new(local: &[(Collider, Convex)], first: u32, second: u32) -> Self {
+        let bound = |solid: u32| if solid == FLOOR { 0.0 } else { local[solid as usize].1.bound() };
+        Self { first, second, reach: bound(first) + bound(second) }
+    }
 }

@@ -6,7 +6,7 @@
 
 use crate::{
     collision::CollisionPair,
-    collision_checker::{CollisionChecker, FLOOR, Pair},
+    collision_checker::{Bunch, CollisionChecker, FLOOR, Pair},
     distance::{Convex, Nearness},
 };
 use nalgebra::{Matrix3, Vector3};
@@ -51,7 +51,7 @@ pub(crate) struct Sweep {
     moves: Vec<f64>,
     /// For each pair, which two entries of `moves` add up to how far they can come closer.
     entries: Vec<[u32; 2]>,
-    /// The pairs of each scope, those that collided lately first: they are the likeliest to collide again.
+    /// The bunches of each scope, those that collided lately first: they are the likeliest to collide again.
     orders: Vec<Vec<u32>>,
     undecided: Vec<u32>,
     intervals: Vec<Interval>,
@@ -94,13 +94,15 @@ impl Scope {
 }
 
 impl Sweep {
-    pub(crate) fn new(arms: Vec<Reaches>, solids: usize, pairs: &[Pair], frozen: &[usize]) -> Self {
+    pub(crate) fn new(arms: Vec<Reaches>, solids: usize, pairs: &[Pair], bunches: &[Bunch], frozen: &[usize]) -> Self {
         let (width, zero) = (width(&arms), solids * width(&arms));
-        let owner = |solid: u32| {
-            let index = solid as usize;
-            let arm = arms.iter().position(|arm| (arm.first_slot..arm.first_slot + arm.of_solids.len()).contains(&index))?;
-            Some((arm, arms[arm].of_solids[index - arms[arm].first_slot].len()))
-        };
+        let mut owners = vec![None; solids];
+        for (index, arm) in arms.iter().enumerate() {
+            for (slot, reaches) in (arm.first_slot..).zip(&arm.of_solids) {
+                owners[slot] = Some((index, reaches.len()));
+            }
+        }
+        let owner = |solid: u32| owners.get(solid as usize).copied().flatten();
         let entry = |solid: u32, link: usize| (solid as usize * width + link) as u32;
         let entries = pairs.iter().map(|pair| match (owner(pair.first), owner(pair.second)) {
             // against each other only the joints between them count
@@ -116,7 +118,8 @@ impl Sweep {
         debug_assert!(pairs.iter().all(|pair| pair.first != FLOOR), "the floor comes second");
         let entries: Vec<[u32; 2]> = entries.collect();
         let mut orders = vec![Vec::new(); arms.len() + 2];
-        for (index, pair) in pairs.iter().enumerate() {
+        for (index, bunch) in bunches.iter().enumerate() {
+            let pair = &pairs[bunch.balls];
             let mover = |solid: u32| owner(solid).map(|(arm, _)| arm).filter(|arm| !frozen.contains(arm));
             let scope = match (mover(pair.first), mover(pair.second)) {
                 (Some(one), Some(other)) if one != other => Scope::Between,
@@ -175,11 +178,20 @@ impl CollisionChecker<'_> {
         let mut q = std::mem::take(&mut self.sweep.q);
         let hit = self.sweep_intervals(&order, (from, to), margin, (&mut undecided, &mut intervals, &mut q));
         (self.sweep.undecided, self.sweep.intervals, self.sweep.q) = (undecided, intervals, q);
-        if let Some(place) = hit.and_then(|hit| order.iter().position(|&pair| pair as usize == hit)) {
+        let holds = |bunch: u32, hit: usize| self.bunches[bunch as usize].members.contains(&hit);
+        if let Some(place) = hit.and_then(|hit| order.iter().position(|&bunch| holds(bunch, hit))) {
             order[..=place].rotate_right(1);
         }
         self.sweep.orders[scope.index()] = order;
         hit
+    }
+
+    fn place_pair(&mut self, pair: usize) {
+        let Pair { first, second, .. } = self.pairs[pair];
+        self.place_solid(first as usize);
+        if second != FLOOR {
+            self.place_solid(second as usize);
+        }
     }
 
     fn sweep_intervals(
@@ -198,10 +210,19 @@ impl CollisionChecker<'_> {
         intervals.clear();
         // The end is a sample of its own, and fails soonest.
         self.place(to);
-        if let Some(&hit) = order.iter().find(|&&pair| self.nearness(pair as usize, margin, margin) == Nearness::Hit) {
-            return Some(hit as usize);
+        let bunches = || order.iter().map(|&bunch| bunch as usize);
+        if let Some(hit) = bunches().find_map(|bunch| self.hit_in(&self.bunches[bunch], margin)) {
+            return Some(hit);
         }
-        undecided.extend_from_slice(order);
+        q.clear();
+        q.extend(from.iter().zip(to).map(|(a, b)| a + (b - a) * 0.5));
+        self.place(q);
+        for bunch in bunches() {
+            let bunch = &self.bunches[bunch];
+            if !self.is_clear(bunch, margin, margin / 2.0 + closing(self, bunch.balls) * 0.5) {
+                undecided.extend(bunch.members.clone().map(|pair| pair as u32));
+            }
+        }
         intervals.push(Interval { middle: 0.5, half: 0.5, first: 0, end: undecided.len() });
         let mut next = 0;
         while let Some(&Interval { middle, half, first, end }) = intervals.get(next) {
@@ -211,10 +232,11 @@ impl CollisionChecker<'_> {
             }
             q.clear();
             q.extend(from.iter().zip(to).map(|(a, b)| a + (b - a) * middle));
-            self.place(q);
+            self.pose(q);
             let kept = undecided.len();
             for index in first..end {
                 let pair = undecided[index] as usize;
+                self.place_pair(pair);
                 match self.nearness(pair, margin, margin / 2.0 + closing(self, pair) * half) {
                     Nearness::Hit => return Some(pair),
                     Nearness::Near => undecided.push(pair as u32),
