@@ -13,12 +13,10 @@ use crate::{
 };
 use std::{cmp::Ordering, collections::BinaryHeap, ops::Range};
 
-/// Tries with new ways of the single arms.
-const ATTEMPTS: usize = 3;
 /// Most nodes of a lattice.
 const MAX_NODES: usize = 40_000;
 
-/// The way of one arm.
+/// The way of one arm; of one that stays, its place.
 struct Track {
     joints: Range<usize>,
     /// Angles of this arm alone (rad), joined by straight lines.
@@ -26,18 +24,24 @@ struct Track {
 }
 
 impl Planner<'_> {
-    /// A way for all arms from ways of the single arms, none if they cannot be timed; with one moving arm always none.
-    pub(crate) fn coordinated(&mut self, start: &[f64], goal: &[f64], stream: &mut Stream) -> Option<Vec<Vec<f64>>> {
-        let arms: Vec<Range<usize>> = self.arms().into_iter().filter(|own| start[own.clone()] != goal[own.clone()]).collect();
-        if arms.len() < 2 {
+    /// A way for all arms from ways of the single arms, sought anew for each of some attempts; for one moving arm always none.
+    pub(crate) fn coordinated(
+        &mut self,
+        start: &[f64],
+        goal: &[f64],
+        attempts: usize,
+        stream: &mut Stream,
+    ) -> Option<Vec<Vec<f64>>> {
+        let arms = self.arms();
+        if arms.iter().filter(|own| start[(*own).clone()] != goal[(*own).clone()]).count() < 2 {
             return None;
         }
-        (0..ATTEMPTS).find_map(|_| {
+        (0..attempts).find_map(|_| {
             let mut tracks = Vec::with_capacity(arms.len());
             for joints in &arms {
                 let mut target = start.to_vec();
                 target[joints.clone()].copy_from_slice(&goal[joints.clone()]);
-                let path = self.alone(joints, start, &target, stream)?;
+                let path = if target == start { vec![target] } else { self.alone(joints, start, &target, stream)? };
                 let points = path.into_iter().map(|q| q[joints.clone()].to_vec()).collect();
                 tracks.push(Track { joints: joints.clone(), points });
             }
@@ -67,6 +71,7 @@ impl Planner<'_> {
         let mut costs = vec![f64::INFINITY; lattice.nodes];
         let mut came_from = vec![usize::MAX; lattice.nodes];
         let mut closed = vec![false; lattice.nodes];
+        let mut known = Known::new(&lattice);
         let mut open = BinaryHeap::from([Open { estimate: lattice.left(0), node: 0 }]);
         costs[0] = 0.0;
         while let Some(Open { node, .. }) = open.pop() {
@@ -90,13 +95,49 @@ impl Planner<'_> {
                     continue;
                 }
                 let to = lattice.configuration(start, tracks, next);
-                if self.edge_is_free_in(Scope::Between, &from, &to) {
+                if self.step_is_free(&lattice, &mut known, (node, &from), (next, &to)) {
                     (costs[next], came_from[next]) = (cost, node);
                     open.push(Open { estimate: cost + lattice.left(next), node: next });
                 }
             }
         }
         None
+    }
+}
+
+impl Planner<'_> {
+    /// Whether no two arms meet on a step through the lattice; what is known of two arms holds wherever the others are.
+    fn step_is_free(
+        &mut self,
+        lattice: &Lattice,
+        known: &mut Known,
+        (node, from): (usize, &[f64]),
+        (next, to): (usize, &[f64]),
+    ) -> bool {
+        let stops = |axis: &Axis| (lattice.stop(node, axis), lattice.stop(next, axis));
+        lattice.axes.iter().enumerate().all(|(one, first)| {
+            lattice.axes.iter().enumerate().skip(one + 1).all(|(other, second)| {
+                let ((i, to_i), (j, to_j)) = (stops(first), stops(second));
+                let entry = 4 * (i * second.stops.len() + j) + 2 * (to_i - i) + (to_j - j);
+                *known.0[one * lattice.axes.len() + other][entry]
+                    .get_or_insert_with(|| self.edge_is_free_in(Scope::Pair(one, other), from, to))
+            })
+        })
+    }
+}
+
+/// For two arms, from which stops, and which of both goes on: whether that is free, where it was asked.
+struct Known(Vec<Vec<Option<bool>>>);
+
+impl Known {
+    fn new(lattice: &Lattice) -> Self {
+        let pairs = lattice.axes.iter().enumerate().flat_map(|(one, first)| {
+            let table = move |(other, second): (usize, &Axis)| {
+                if one < other { vec![None; 4 * first.stops.len() * second.stops.len()] } else { Vec::new() }
+            };
+            lattice.axes.iter().enumerate().map(table)
+        });
+        Self(pairs.collect())
     }
 }
 
@@ -115,6 +156,9 @@ impl Track {
 
     fn at(&self, share: f64) -> Vec<f64> {
         let shares = self.shares();
+        if shares.len() == 1 {
+            return self.points[0].clone();
+        }
         let after = shares.partition_point(|&before| before <= share).clamp(1, shares.len() - 1);
         let (low, high) = (shares[after - 1], shares[after]);
         let fraction = if high > low { ((share - low) / (high - low)).clamp(0.0, 1.0) } else { 1.0 };
@@ -139,7 +183,7 @@ impl Lattice {
     fn new(tracks: &[Track]) -> Option<Self> {
         let parts = match tracks.len() {
             2 => 16.0,
-            3 => 10.0,
+            3 => 14.0,
             _ => 4.0,
         };
         let mut nodes = 1_usize;

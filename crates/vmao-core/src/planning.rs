@@ -195,7 +195,13 @@ impl<'a> Planner<'a> {
         if self.edge_is_free(start, goal) {
             return Some(vec![start.to_vec(), goal.to_vec()]);
         }
-        self.coordinated(start, goal, stream).or_else(|| self.grow_trees(start, goal, self.settings.max_iterations, stream))
+        // Arms that only get in each other's way are soonest timed; arms that must change places soonest found in all
+        // joints at once. What neither finds quickly gets more of both.
+        let samples = self.settings.max_iterations;
+        [(3, samples / 20), (30, samples - samples / 20)].into_iter().find_map(|(attempts, samples)| {
+            let timed = self.coordinated(start, goal, attempts, stream);
+            timed.or_else(|| self.grow_trees(start, goal, samples, stream))
+        })
     }
 
     /// The joints of each arm.

@@ -65,8 +65,10 @@ pub(crate) enum Scope {
     All,
     /// One moving arm with itself and with what does not move.
     Own(usize),
-    /// Two arms that both move.
+    /// Any two arms that both move.
     Between,
+    /// These two arms, the lower index first, if both move.
+    Pair(usize, usize),
 }
 
 #[derive(Debug, Clone, Copy)]
@@ -84,11 +86,12 @@ fn width(arms: &[Reaches]) -> usize {
 }
 
 impl Scope {
-    fn index(self) -> usize {
+    fn index(self, arms: usize) -> usize {
         match self {
             Self::All => 0,
             Self::Between => 1,
             Self::Own(arm) => 2 + arm,
+            Self::Pair(one, other) => 2 + arms + one * arms + other,
         }
     }
 }
@@ -117,17 +120,20 @@ impl Sweep {
         });
         debug_assert!(pairs.iter().all(|pair| pair.first != FLOOR), "the floor comes second");
         let entries: Vec<[u32; 2]> = entries.collect();
-        let mut orders = vec![Vec::new(); arms.len() + 2];
+        let mut orders = vec![Vec::new(); 2 + arms.len() + arms.len() * arms.len()];
         for (index, bunch) in bunches.iter().enumerate() {
             let pair = &pairs[bunch.balls];
             let mover = |solid: u32| owner(solid).map(|(arm, _)| arm).filter(|arm| !frozen.contains(arm));
-            let scope = match (mover(pair.first), mover(pair.second)) {
-                (Some(one), Some(other)) if one != other => Scope::Between,
-                (Some(arm), _) | (None, Some(arm)) => Scope::Own(arm),
-                (None, None) => Scope::Between, // never: one side of every pair moves
-            };
-            orders[scope.index()].push(index as u32);
-            orders[Scope::All.index()].push(index as u32);
+            let mut list = |scope: Scope| orders[scope.index(arms.len())].push(index as u32);
+            list(Scope::All);
+            match (mover(pair.first), mover(pair.second)) {
+                (Some(one), Some(other)) if one != other => {
+                    list(Scope::Between);
+                    list(Scope::Pair(one.min(other), one.max(other)));
+                }
+                (Some(arm), _) | (None, Some(arm)) => list(Scope::Own(arm)),
+                (None, None) => {}
+            }
         }
         Self { entries, orders, moves: vec![0.0; zero + 1], arms, undecided: Vec::new(), intervals: Vec::new(), q: Vec::new() }
     }
@@ -171,7 +177,8 @@ impl CollisionChecker<'_> {
 
     fn edge_hit(&mut self, scope: Scope, from: &[f64], to: &[f64], margin: f64) -> Option<usize> {
         self.sweep.bound_moves(from, to);
-        let mut order = std::mem::take(&mut self.sweep.orders[scope.index()]);
+        let scope = scope.index(self.sweep.arms.len());
+        let mut order = std::mem::take(&mut self.sweep.orders[scope]);
         // Buffers leave `self` while pairs are judged and come back below; nothing in between can panic.
         let mut undecided = std::mem::take(&mut self.sweep.undecided);
         let mut intervals = std::mem::take(&mut self.sweep.intervals);
@@ -182,7 +189,7 @@ impl CollisionChecker<'_> {
         if let Some(place) = hit.and_then(|hit| order.iter().position(|&bunch| holds(bunch, hit))) {
             order[..=place].rotate_right(1);
         }
-        self.sweep.orders[scope.index()] = order;
+        self.sweep.orders[scope] = order;
         hit
     }
 
