@@ -5,6 +5,8 @@ use crate::cameras::CameraConfig;
 use crate::execution::MotionConfig;
 use crate::failure::Failure;
 use crate::grasping::GraspConfig;
+use crate::measures::MotionMeasures;
+use crate::profile::{self, Stage};
 use crate::scene::Scene;
 use crate::task::{GoalConfig, StartConfig, Thresholds};
 use serde::{Deserialize, Serialize};
@@ -50,6 +52,8 @@ pub struct Trial {
     pub record: TrialRecord,
     /// Smallest factor on all thresholds at which the trial would have succeeded; infinite if it failed before its end.
     pub threshold_factor: f64,
+    /// How the motions of the object went with all parts held; zeros if it never came to that.
+    pub motion: MotionMeasures,
     /// Its motion, if asked for.
     pub rollout: Option<Rollout>,
 }
@@ -65,9 +69,11 @@ pub fn run_trial(
     (seed, index): (u64, u64),
     recording: Recording,
 ) -> Trial {
-    let mut attempt = Attempt::begin(scene, config, order, (seed, index), recording);
-    let outcome = manipulate(&mut attempt, model, order);
-    attempt.finish(outcome)
+    profile::time(Stage::Rest, || {
+        let mut attempt = Attempt::begin(scene, config, order, (seed, index), recording);
+        let outcome = manipulate(&mut attempt, model, order);
+        attempt.finish(outcome)
+    })
 }
 
 fn manipulate(attempt: &mut Attempt<'_>, model: &dyn ContactModel, order: GraspOrder) -> Result<(), Failure> {
