@@ -16,11 +16,12 @@ const STEP: f64 = 0.01; // rad
 fn judge(problem: &PlanningProblem) -> CollisionJudge {
     let openings: Vec<f64> = problem.robots.iter().map(|robot| robot.gripper.max_opening()).collect();
     let (scene, _) = support::configuration();
-    CollisionJudge::new(&scene, &problem.robots, &problem.world_from_bases, &openings, &problem.obstacles).unwrap()
+    CollisionJudge::new(&scene, &problem.robots, &problem.world_from_bases, &openings, &problem.obstacles)
+        .expect("the simulator takes the model")
 }
 
 fn robots(names: &str) -> Vec<RobotModel> {
-    names.split(',').map(|name| RobotModel::named(name).unwrap()).collect()
+    names.split(',').map(|name| RobotModel::named(name).expect("a known robot")).collect()
 }
 
 /// Speeds and accelerations of the timed path stay within the limits, measured from its positions alone.
