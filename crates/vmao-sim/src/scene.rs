@@ -200,7 +200,7 @@ fn id(model: &MjModel, kind: MjtObjBase, name: &str) -> Result<usize, Error> {
     model.name_to_id(kind, name).ok_or_else(|| Error::Model { cause: format!("the compiled model has no `{name}`") })
 }
 
-fn addresses(model: &MjModel, joint: &str) -> Result<(usize, usize), Error> {
+pub(crate) fn addresses(model: &MjModel, joint: &str) -> Result<(usize, usize), Error> {
     let joint = id(model, MjtObjBase::mjOBJ_JOINT, joint)?;
     Ok((model.jnt_qposadr()[joint] as usize, model.jnt_dofadr()[joint] as usize))
 }

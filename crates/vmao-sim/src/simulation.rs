@@ -114,7 +114,7 @@ impl<'s> Simulation<'s> {
         let limit = 2.0 * gripper.max_force;
         match self.grips[arm] {
             Grip::Open(opening) => {
-                let target = ((opening - gripper.closed_gap) / 2.0).clamp(0.0, gripper.travel);
+                let target = gripper.finger_travel(opening);
                 (OPENING_STIFFNESS * (target - self.data.qpos()[self.scene.arms[arm].finger_qpos])).clamp(-limit, limit)
             }
             Grip::Close(force) => -(2.0 * force).min(limit),

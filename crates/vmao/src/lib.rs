@@ -16,6 +16,7 @@ pub mod learned_contacts;
 pub mod learning;
 pub mod ocao;
 pub mod output;
+pub mod plan;
 pub mod provenance;
 pub mod report;
 pub mod results;

@@ -158,9 +158,9 @@ pub fn answer(document: &Document) -> Result<Answer, DocumentError> {
     let deltas = joint_deltas(document, &request)?;
     let mut world_from_parts = Vec::with_capacity(request.object.parts.len());
     for (index, part) in request.object.parts.iter().enumerate() {
-        world_from_parts.push(pose(document, JsonPath::key("object").then("parts").at(index).then("pose"), &part.pose)?);
+        world_from_parts.push(part.pose.to_pose_at(document, &JsonPath::key("object").then("parts").at(index).then("pose"))?);
     }
-    let goal_world_from_root = pose(document, JsonPath::key("goal").then("root_pose"), &request.goal.root_pose)?;
+    let goal_world_from_root = request.goal.root_pose.to_pose_at(document, &JsonPath::key("goal").then("root_pose"))?;
     let goals = goal_part_poses(&graph, &joints, &world_from_parts, &deltas, root, &goal_world_from_root);
 
     let mut answer = Answer { parts: Vec::with_capacity(goals.len()), grippers: Vec::with_capacity(request.grippers.len()) };
@@ -173,7 +173,7 @@ pub fn answer(document: &Document) -> Result<Answer, DocumentError> {
     for (index, gripper) in request.grippers.iter().enumerate() {
         let path = JsonPath::key("grippers").at(index);
         let part = usize::from(parts.find(document, &path.clone().then("part"), &gripper.part)?.0);
-        let world_from_gripper = pose(document, path.clone().then("pose"), &gripper.pose)?;
+        let world_from_gripper = gripper.pose.to_pose_at(document, &path.clone().then("pose"))?;
         let goal = gripper_goal(&world_from_parts[part], &goals[part], &world_from_gripper);
         if !finite(&goal) {
             return refuse(path, overflow("gripper", &gripper.name));
@@ -189,11 +189,6 @@ fn finite(pose: &Pose) -> bool {
 
 fn overflow(kind: &str, name: &str) -> String {
     format!("the goal pose of {kind} {} overflows, expected numbers whose sums and products are finite doubles", quoted(name))
-}
-
-fn pose(document: &Document, path: JsonPath, pose: &JsonPose) -> Result<Pose, DocumentError> {
-    let zero = || document.refuse(&path.then("quaternion"), "a zero quaternion, expected a rotation [w, x, y, z]".to_owned());
-    pose.to_pose().ok_or_else(zero)
 }
 
 /// The parts by name.

@@ -9,6 +9,7 @@ mod explore;
 mod ik;
 mod object;
 mod ocao;
+mod plan;
 mod report;
 mod scene;
 mod session;
@@ -53,6 +54,8 @@ enum Command {
     Ocao(ocao::OcaoArguments),
     /// Joint positions that put a robot's flange or tool at given poses
     Ik(ik::IkArguments),
+    /// A collision-free path of several arms at once
+    Plan(plan::PlanArguments),
 }
 
 /// Runs the program on these arguments, its own name first: 0 done, 1 the work failed, 2 bad input or usage.
@@ -98,6 +101,7 @@ fn execute(command: Command, command_line: &[String]) -> Result<(), Failure> {
         Command::Scene(arguments) => scene::run(&arguments, &session(&arguments.common)?),
         Command::Ik(arguments) => ik::run(&arguments, &session(&arguments.common)?),
         Command::Ocao(arguments) => ocao::run(&arguments, &session(&arguments.common)?),
+        Command::Plan(arguments) => plan::run(&arguments, &session(&arguments.common)?),
     }
 }
 
