@@ -4,6 +4,7 @@ mod cameras;
 mod catalogue;
 mod control;
 mod kinematics;
+mod object_trees;
 #[path = "../../tests/support/mod.rs"]
 mod support;
 mod witness;
