@@ -4,22 +4,21 @@ use crate::assignment::assignments;
 use crate::cameras::observe;
 use crate::combinations::{Choices, Reserve, compatible_grasps, free_alone, joint_positions_with};
 use crate::failure::Failure;
-use crate::grasping::{Grasp, GraspConfig, MAX_JOINT_STEP, ik_settings, object_cloud, reachable_grasps};
+use crate::grasping::{Grasp, GraspConfig, object_cloud, reachable_grasps};
+use crate::measures::Measuring;
 use crate::planning_world::{Obstacles, collision_world};
 use crate::recorder::Recorder;
 use crate::scene::Scene;
 use crate::simulation::{Grip, Simulation};
-use crate::task::{goal_errors, sample_goal, sample_start, threshold_factor};
+use crate::task::{goal_errors, sample_goal, sample_start};
 use crate::trial::{Recording, Trial, TrialConfig};
 use nalgebra::Point3;
 use std::ops::Range;
-use vmao_core::collision::CollisionChecker;
 use vmao_core::contact::{ArmId, Contact, PartId};
 use vmao_core::contact_model::{ContactModel, ContactQuery};
-use vmao_core::geometry::{Pose, interpolate, rotation_distance};
-use vmao_core::inverse_kinematics::track;
+use vmao_core::geometry::{Pose, interpolate};
 use vmao_core::object::{ObjectGoal, ObjectState};
-use vmao_core::object_centric::{ObjectTrajectory, part_poses};
+use vmao_core::object_centric::part_poses;
 use vmao_core::object_graph::ObjectGraph;
 use vmao_core::order::GraspOrder;
 use vmao_core::outcome::{FailureStage, TrialOutcome};
@@ -42,11 +41,6 @@ enum Draw {
 /// Longest time an object may take to come to rest (s), and the speed below which it rests.
 const SETTLE_SECONDS: f64 = 1.0;
 const REST_SPEED: f64 = 2e-3;
-/// Time for the controllers to settle after a motion between grasps, and after the last one (s).
-const SETTLE_AFTER_MOTION: f64 = 0.3;
-const SETTLE_AT_GOAL: f64 = 0.5;
-/// First leg of the alternative route: straight up by this much (m).
-const LIFT_FIRST: f64 = 0.07;
 /// Steps in which the motion after a later grasp is looked at.
 const RESERVE_WAYPOINTS: usize = 4;
 
@@ -56,28 +50,27 @@ pub(crate) struct Approach {
     last_stretch: Trajectory,
 }
 
-/// Joint positions (rad) of each holding arm at each waypoint of a motion.
-type Postures = Vec<Vec<Vec<f64>>>;
-
 /// A trial under way.
 pub(crate) struct Attempt<'a> {
-    scene: &'a Scene,
-    config: &'a TrialConfig,
-    simulation: Simulation<'a>,
-    graph: ObjectGraph,
+    pub(crate) scene: &'a Scene,
+    pub(crate) config: &'a TrialConfig,
+    pub(crate) simulation: Simulation<'a>,
+    pub(crate) graph: ObjectGraph,
     order: GraspOrder,
     seed: u64,
     index: u64,
     /// Which arm grasps each part.
     arms: Vec<ArmId>,
     start: ObjectState,
-    goal: ObjectGoal,
-    goal_parts: Vec<Pose>,
-    held: Vec<(ArmId, PartId)>,
+    pub(crate) goal: ObjectGoal,
+    pub(crate) goal_parts: Vec<Pose>,
+    pub(crate) held: Vec<(ArmId, PartId)>,
     grasps: Vec<GraspRecord>,
-    errors: [f64; 4],
+    pub(crate) errors: [f64; 4],
     /// Worst ratio of error to threshold while the goal was to be held.
-    factor: f64,
+    pub(crate) factor: f64,
+    /// How the motions of the object went with all parts held.
+    pub(crate) measuring: Measuring,
 }
 
 impl<'a> Attempt<'a> {
@@ -124,6 +117,7 @@ impl<'a> Attempt<'a> {
             grasps,
             errors,
             factor: f64::INFINITY,
+            measuring: Measuring::default(),
         }
     }
 
@@ -136,7 +130,7 @@ impl<'a> Attempt<'a> {
         Stream::new(self.seed, &[self.index, draw as u64, self.held.len() as u64])
     }
 
-    fn note(&mut self, label: String) {
+    pub(crate) fn note(&mut self, label: String) {
         let steps = self.simulation.steps;
         if let Some(recorder) = &mut self.simulation.recorder {
             recorder.event(steps, label);
@@ -342,109 +336,6 @@ impl<'a> Attempt<'a> {
         Ok(())
     }
 
-    /// Moves the object by object-centric control with all arms that hold it: straight to the step's goal, or up first.
-    pub(crate) fn move_object(&mut self) -> Result<(), Failure> {
-        let goal = self.step_goal(self.held.len());
-        let last = self.held.len() == self.part_count();
-        let mut up_first = self.step_goal(self.held.len());
-        let now = self.simulation.object_state();
-        up_first.world_from_root = Pose::translation(0.0, 0.0, LIFT_FIRST) * now.world_from_parts[usize::from(goal.root.0)];
-        up_first.joint_positions.clone_from(&now.joint_positions);
-        let routes = [vec![goal.clone()], vec![up_first, goal]];
-        let mut blocked = Failure::new(FailureStage::NoPlan, "no route");
-        for route in routes {
-            match self.plan_carry(&route[0]) {
-                Err(failure) => blocked = failure,
-                Ok(_) => {
-                    let legs = route.len();
-                    for (leg, goal) in route.into_iter().enumerate() {
-                        let extra = if leg + 1 < legs {
-                            0.0
-                        } else if last {
-                            SETTLE_AT_GOAL + self.config.thresholds.hold_seconds
-                        } else {
-                            SETTLE_AFTER_MOTION
-                        };
-                        self.carry_to(&goal, extra)?;
-                    }
-                    return Ok(());
-                }
-            }
-        }
-        Err(blocked)
-    }
-
-    fn carry_to(&mut self, goal: &ObjectGoal, extra: f64) -> Result<(), Failure> {
-        let (trajectory, postures) = self.plan_carry(goal)?;
-        self.note(format!("move the object, {} held", self.held.len()));
-        let hold_from = trajectory.duration() + extra - self.config.thresholds.hold_seconds;
-        let (held, motion) = (self.held.clone(), &self.config.motion);
-        let (scene, goal_parts, wanted, thresholds) = (self.scene, &self.goal_parts, &self.goal, &self.config.thresholds);
-        let (mut worst, mut errors) = (0.0_f64, self.errors);
-        let outcome = self.simulation.carry(&trajectory, &held, &postures, extra, motion, |simulation, time| {
-            if time >= hold_from {
-                errors = goal_errors(scene, goal_parts, wanted, &simulation.object_state());
-                worst = worst.max(threshold_factor(thresholds, &errors));
-            }
-        });
-        self.errors = errors;
-        self.factor = worst;
-        outcome
-    }
-
-    /// The object's trajectory to `goal` and the joint positions of each holding arm along it, free of collision.
-    fn plan_carry(&self, goal: &ObjectGoal) -> Result<(ObjectTrajectory, Postures), Failure> {
-        let trajectory = self.trajectory(goal.clone());
-        let waypoints = self.waypoints(&trajectory);
-        let mut postures = Vec::new();
-        for &(arm, part) in &self.held {
-            let (index, part) = (usize::from(arm.0), usize::from(part.0));
-            let base_from_world = self.scene.world_from_bases[index].inverse();
-            let part_from_tool = waypoints[0][part].inverse() * self.simulation.tool_pose(index);
-            let poses: Vec<Pose> = waypoints[1..].iter().map(|parts| base_from_world * parts[part] * part_from_tool).collect();
-            let now = self.simulation.joint_positions(index).as_slice().to_vec();
-            let way = track(&self.simulation.chains[index], &poses, &now, MAX_JOINT_STEP, &ik_settings(0)).map_err(|_where| {
-                Failure::new(FailureStage::Unreachable, format!("arm {index} cannot follow the object to its goal"))
-            })?;
-            postures.push(std::iter::once(now).chain(way).collect::<Vec<_>>());
-        }
-        let openings: Vec<f64> = (0..self.scene.robots.len()).map(|arm| self.simulation.opening(arm)).collect();
-        let world = collision_world(&self.simulation, &openings, &Obstacles::Nothing);
-        let mut checker = CollisionChecker::new(&world);
-        for waypoint in 1..waypoints.len() {
-            let arms = 0..self.scene.robots.len();
-            let q: Vec<f64> = arms
-                .flat_map(|arm| match self.held.iter().position(|(held, _)| usize::from(held.0) == arm) {
-                    Some(place) => postures[place][waypoint].clone(),
-                    None => self.simulation.joint_positions(arm).as_slice().to_vec(),
-                })
-                .collect();
-            if let Some(pair) = checker.check(&q, self.config.grasp.carry_margin / 2.0) {
-                return Err(Failure::new(FailureStage::NoPlan, format!("on the way to the goal {pair}")));
-            }
-        }
-        Ok((trajectory, postures))
-    }
-
-    /// The object's trajectory from where it is now.
-    fn trajectory(&self, goal: ObjectGoal) -> ObjectTrajectory {
-        let now = self.simulation.object_state();
-        let parts = part_poses(&self.scene.object, &self.graph, goal.root, &goal.world_from_root, &goal.joint_positions);
-        let motion = &self.config.motion;
-        let mut duration = motion.shortest_motion;
-        for (from, to) in now.world_from_parts.iter().zip(&parts) {
-            let distance = (to.translation.vector - from.translation.vector).norm();
-            duration = duration.max(distance / motion.object_speed);
-            duration = duration.max(rotation_distance(&from.rotation, &to.rotation) / motion.object_turning_speed);
-        }
-        ObjectTrajectory::new(&self.scene.object, &self.graph, now, goal, duration)
-    }
-
-    fn waypoints(&self, trajectory: &ObjectTrajectory) -> Vec<Vec<Pose>> {
-        let count = self.config.motion.waypoints;
-        (0..=count).map(|i| trajectory.part_poses_at(trajectory.duration() * i as f64 / count as f64)).collect()
-    }
-
     /// (arm, part) pairs that may touch: an arm that holds the object may touch all of it.
     fn holders(&self) -> Vec<(usize, usize)> {
         let parts = 0..self.part_count();
@@ -485,6 +376,11 @@ impl<'a> Attempt<'a> {
         let (index, seed, order, start, goal, grasps) = (self.index, self.seed, self.order, self.start, self.goal, self.grasps);
         let record = TrialRecord { index, seed, order, start, goal, grasps, outcome, detail, steps, final_errors: self.errors };
         let got_so_far = matches!(outcome, TrialOutcome::Success | TrialOutcome::Failed(FailureStage::Threshold));
-        Trial { record, threshold_factor: if got_so_far { self.factor } else { f64::INFINITY }, rollout }
+        Trial {
+            record,
+            threshold_factor: if got_so_far { self.factor } else { f64::INFINITY },
+            rollout,
+            motion: self.measuring.finish(),
+        }
     }
 }

@@ -90,7 +90,7 @@ impl Simulation<'_> {
         for grasp in grasps {
             let arm = usize::from(grasp.arm.0);
             self.goals[arm].twist = Vector6::zeros();
-            self.grips[arm] = Grip::Close(config.closing_share);
+            self.grips[arm] = Grip::Close(config.closing_force);
         }
         self.wait(config.closing_seconds);
         // Contacts of stiff bodies come and go from one tick to the next: what counts is the mean over a moment.

@@ -46,8 +46,8 @@ pub struct GraspConfig {
     pub ik_candidates: usize,
     /// Random starts of each joint solution search.
     pub ik_restarts: usize,
-    /// Share of the gripper's greatest force it closes with.
-    pub closing_share: f64,
+    /// Force with which each pad closes (N), as far as the gripper can.
+    pub closing_force: f64,
     /// How long the fingers may take to close (s).
     pub closing_seconds: f64,
     /// Each pad must press on the part with at least this (N) for a hold.

@@ -16,7 +16,7 @@ use vmao_core::osc::{ArmState, GripperGoal, JointVector, OscGains, torques};
 pub(crate) enum Grip {
     /// Go to this gap between the pads (m).
     Open(f64),
-    /// Press with this share of the greatest force.
+    /// Press with this force on each pad (N), as far as the gripper can.
     Close(f64),
 }
 
@@ -108,7 +108,7 @@ impl<'s> Simulation<'s> {
                 let target = ((opening - gripper.closed_gap) / 2.0).clamp(0.0, gripper.travel);
                 (OPENING_STIFFNESS * (target - self.data.qpos()[self.scene.arms[arm].finger_qpos])).clamp(-limit, limit)
             }
-            Grip::Close(share) => -share * limit,
+            Grip::Close(force) => -(2.0 * force).min(limit),
         }
     }
 

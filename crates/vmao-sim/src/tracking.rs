@@ -116,7 +116,7 @@ fn pick_up(simulation: &mut Simulation<'_>, robot: &RobotModel, trial: &TrialCon
         seconds: 3.0,
     };
     follow_tool_path(simulation, Posture::Home, &down);
-    simulation.grips[0] = Grip::Close(trial.grasp.closing_share);
+    simulation.grips[0] = Grip::Close(trial.grasp.closing_force);
     simulation.wait(trial.grasp.closing_seconds);
     follow_tool_path(simulation, Posture::Home, &Move { name: "up", shift: -down.shift, ..down });
 }

@@ -5,6 +5,7 @@ use crate::cameras::CameraConfig;
 use crate::execution::MotionConfig;
 use crate::failure::Failure;
 use crate::grasping::GraspConfig;
+use crate::measures::MotionMeasures;
 use crate::scene::Scene;
 use crate::task::{GoalConfig, StartConfig, Thresholds};
 use serde::{Deserialize, Serialize};
@@ -50,6 +51,8 @@ pub struct Trial {
     pub record: TrialRecord,
     /// Smallest factor on all thresholds at which the trial would have succeeded; infinite if it failed before its end.
     pub threshold_factor: f64,
+    /// How the motions of the object went with all parts held; zeros if it never came to that.
+    pub motion: MotionMeasures,
     /// Its motion, if asked for.
     pub rollout: Option<Rollout>,
 }

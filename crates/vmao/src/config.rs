@@ -250,7 +250,7 @@ fn check_control(grasp: &GraspConfig, motion: &MotionConfig, osc: &OscGains) -> 
     within("grasp.carry_margin", grasp.carry_margin, 0.0, 0.1)?;
     within("grasp.shortlist", grasp.shortlist as f64, 1.0, 1000.0)?;
     within("grasp.ik_candidates", grasp.ik_candidates as f64, 1.0, 100.0)?;
-    within("grasp.closing_share", grasp.closing_share, 0.0, 1.0)?;
+    within("grasp.closing_force", grasp.closing_force, 0.0, 200.0)?;
     within("grasp.closing_seconds", grasp.closing_seconds, 0.0, 10.0)?;
     within("grasp.hold_force", grasp.hold_force, 0.0, 1000.0)?;
     within("motion.velocity_share", motion.velocity_share, 0.01, 1.0)?;

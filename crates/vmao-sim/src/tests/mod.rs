@@ -3,6 +3,7 @@
 mod cameras;
 mod catalogue;
 mod control;
+mod internal_forces;
 mod kinematics;
 mod object_trees;
 #[path = "../../tests/support/mod.rs"]

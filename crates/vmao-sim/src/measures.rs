@@ -1,0 +1,122 @@
+//! How a motion of the held object went: forces that the arms waste on each other, errors of the parts, paths of the hands.
+
+use crate::scene::Owner;
+use crate::simulation::Simulation;
+use nalgebra::{Matrix3, Vector3};
+use vmao_core::geometry::Pose;
+
+/// What was measured while all arms of a trial moved the object together.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct MotionMeasures {
+    /// Largest internal force of an arm, mean over 50 ms (N).
+    pub peak_internal_force: f64,
+    /// Mean over the motion of the largest internal force of an arm (N).
+    pub mean_internal_force: f64,
+    /// Root mean square distance of the parts from their trajectory (m).
+    pub part_error: f64,
+    /// Length of the ways of all hands (m).
+    pub hand_path: f64,
+}
+
+/// Ticks between two looks, and looks in a mean of forces: contacts of stiff bodies come and go from tick to tick.
+const LOOK_EVERY: u64 = 5;
+const LOOKS: usize = 5;
+
+/// Collects [`MotionMeasures`].
+#[derive(Debug, Default)]
+pub(crate) struct Measuring {
+    /// Sums of the forces of each arm over the present window, and its looks.
+    window: Vec<Vector3<f64>>,
+    looks: usize,
+    windows: usize,
+    force_sum: f64,
+    squares: f64,
+    samples: usize,
+    hands: Vec<Vector3<f64>>,
+    measures: MotionMeasures,
+}
+
+impl Measuring {
+    /// Takes in the state after a tick in which the arms `holding` moved the parts toward `wanted` poses.
+    pub(crate) fn look(&mut self, simulation: &Simulation<'_>, holding: &[usize], wanted: impl FnOnce() -> Vec<Pose>) {
+        if !simulation.steps.is_multiple_of(LOOK_EVERY) {
+            return;
+        }
+        let hands: Vec<Vector3<f64>> = holding.iter().map(|&arm| simulation.tool_pose(arm).translation.vector).collect();
+        if self.hands.len() == hands.len() {
+            self.measures.hand_path += hands.iter().zip(&self.hands).map(|(now, before)| (now - before).norm()).sum::<f64>();
+        }
+        self.hands = hands;
+        for (part, wanted) in simulation.object_state().world_from_parts.iter().zip(wanted()) {
+            self.squares += (part.translation.vector - wanted.translation.vector).norm_squared();
+            self.samples += 1;
+        }
+        let forces = simulation.arm_forces();
+        self.window.resize(holding.len(), Vector3::zeros());
+        for (sum, &arm) in self.window.iter_mut().zip(holding) {
+            *sum += forces[arm];
+        }
+        self.looks += 1;
+        if self.looks == LOOKS {
+            let means: Vec<Vector3<f64>> = self.window.iter().map(|sum| sum / LOOKS as f64).collect();
+            let force = internal_force(&means);
+            self.measures.peak_internal_force = self.measures.peak_internal_force.max(force);
+            self.force_sum += force;
+            self.windows += 1;
+            self.window.fill(Vector3::zeros());
+            self.looks = 0;
+        }
+    }
+
+    pub(crate) fn finish(&self) -> MotionMeasures {
+        MotionMeasures {
+            mean_internal_force: self.force_sum / self.windows.max(1) as f64,
+            part_error: (self.squares / self.samples.max(1) as f64).sqrt(),
+            ..self.measures
+        }
+    }
+}
+
+/// The largest deviation of an arm's force on the object from the mean of all arms (N): what cancels and moves nothing.
+///
+/// fᵢ − (1/N) Σ fⱼ; the mean is what carries and accelerates the object.
+pub(crate) fn internal_force(forces: &[Vector3<f64>]) -> f64 {
+    let mean = forces.iter().sum::<Vector3<f64>>() / forces.len().max(1) as f64;
+    forces.iter().map(|force| (force - mean).norm()).fold(0.0, f64::max)
+}
+
+impl Simulation<'_> {
+    /// Net contact force of each arm on the object, world frame (N).
+    pub(crate) fn arm_forces(&self) -> Vec<Vector3<f64>> {
+        let mut forces = vec![Vector3::zeros(); self.scene.arms.len()];
+        for (index, contact) in self.data.contact().iter().enumerate() {
+            if contact.exclude != 0 {
+                continue;
+            }
+            // The contact frame's first axis points from the first geom to the second, and the force is that on the second.
+            let (arm, sign) = match contact.geom.map(|geom| self.scene.owners[geom as usize]) {
+                [Owner::Link(arm) | Owner::Pad(arm, _), Owner::Part(_)] => (arm, 1.0),
+                [Owner::Part(_), Owner::Link(arm) | Owner::Pad(arm, _)] => (arm, -1.0),
+                _ => continue,
+            };
+            let [normal, first, second, ..] = self.data.contact_force(index);
+            let world_from_contact = Matrix3::from_column_slice(&contact.frame);
+            forces[usize::from(arm.0)] += world_from_contact * Vector3::new(normal, first, second) * sign;
+        }
+        forces
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_carries_is_not_internal_and_what_squeezes_is() {
+        let up = Vector3::z() * 3.0;
+        assert!(internal_force(&[up, up, up]) < 1e-12, "three equal shares of a weight");
+        let squeeze = Vector3::x() * 7.0;
+        assert!((internal_force(&[up + squeeze, up - squeeze]) - 7.0).abs() < 1e-12);
+        assert!(internal_force(&[up]) < 1e-12 && internal_force(&[]) < 1e-12);
+    }
+}
