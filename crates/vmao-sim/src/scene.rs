@@ -132,7 +132,6 @@ impl Scene {
     }
 
     /// The object alone on the table: for what needs no arms.
-    #[cfg(test)]
     pub(crate) fn without_arms(config: &SceneConfig, item: CatalogueItem) -> Result<Self, Error> {
         Self::compile(config, Vec::new(), Vec::new(), item)
     }

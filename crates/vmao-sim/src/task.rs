@@ -76,7 +76,7 @@ pub(crate) fn sample_start(scene: &Scene, config: &StartConfig, stream: &mut Str
 }
 
 /// Height of the lowest point of the object.
-fn lowest_point(scene: &Scene, world_from_root: &Pose, joints: &[f64]) -> f64 {
+pub(crate) fn lowest_point(scene: &Scene, world_from_root: &Pose, joints: &[f64]) -> f64 {
     let parts = part_poses(&scene.object, &scene.graph, PartId(0), world_from_root, joints);
     let placed = scene.object.parts.iter().zip(&parts);
     let heights = placed.flat_map(|(part, pose)| part.solids.iter().map(move |solid| solid.lowest_point(pose)));

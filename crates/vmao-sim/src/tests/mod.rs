@@ -6,6 +6,7 @@ mod control;
 mod internal_forces;
 mod kinematics;
 mod object_trees;
+mod starts_and_goals;
 #[path = "../../tests/support/mod.rs"]
 mod support;
 mod witness;
