@@ -78,7 +78,7 @@ pub(super) fn star(name: &str, count: usize, set: InstanceSet, instance: u16) ->
 
 /// Three sticks end to end; at joint positions zero the outer ones are bent fully to the middle one's right.
 pub(super) fn chain(name: &str, set: InstanceSet, instance: u16) -> CatalogueItem {
-    let stick = Stick::draw(30, set, instance, 0.155);
+    let stick = Stick::draw(30, set, instance, 0.128);
     let pin = Pin { radius: 0.6 * stick.width, thickness: stick.thickness, layers: 2 };
     let (half, bend) = (stick.length / 2.0, BEND.to_radians());
     // Frames at the hinges: two for the middle stick, one for each of the others.
@@ -104,7 +104,7 @@ pub(super) fn chain(name: &str, set: InstanceSet, instance: u16) -> CatalogueIte
         width: stick.width,
         finger_1: 1.0,
     };
-    let grips = [grip(0, outer[0], 0.6, 0.92), grip(1, middle[0], 0.35, 0.65), grip(2, outer[1], 0.6, 0.92)];
+    let grips = [grip(0, outer[0], 0.6, 0.9), grip(1, middle[0], 0.4, 0.6), grip(2, outer[1], 0.6, 0.9)];
     let joints = vec![hinge(1, -half, 2.0 * bend, stick.resistance), hinge(2, half, 2.0 * bend, stick.resistance)];
     assemble(name, parts, joints, &grips)
 }
