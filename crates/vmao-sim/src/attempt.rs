@@ -7,6 +7,7 @@ use crate::failure::Failure;
 use crate::grasping::{Grasp, GraspConfig, object_cloud, reachable_grasps};
 use crate::measures::Measuring;
 use crate::planning_world::{Obstacles, collision_world};
+use crate::profile::{Stage, time};
 use crate::recorder::Recorder;
 use crate::scene::Scene;
 use crate::simulation::{Grip, Simulation};
@@ -158,7 +159,7 @@ impl<'a> Attempt<'a> {
         step: Range<usize>,
     ) -> Result<Vec<[Point3<f64>; 2]>, Failure> {
         let mut stream = self.stream(Draw::Look);
-        let observation = observe(&mut self.simulation, &self.config.cameras, &mut stream);
+        let observation = time(Stage::Observation, || observe(&mut self.simulation, &self.config.cameras, &mut stream));
         let state = self.simulation.object_state();
         let mut contacts = Vec::new();
         for grasp in step {
@@ -166,8 +167,7 @@ impl<'a> Attempt<'a> {
             let world_from_part = state.world_from_parts[grasp];
             let query = ContactQuery { grasp, part, observation: &observation, world_from_part: &world_from_part };
             let mut stream = Stream::new(self.seed, &[self.index, Draw::Contacts as u64, grasp as u64]);
-            let fingers = model
-                .propose(&query, &mut stream)
+            let fingers = time(Stage::Proposal, || model.propose(&query, &mut stream))
                 .ok_or_else(|| Failure::new(FailureStage::NoContact, format!("nothing to touch was seen on part {grasp}")))?;
             if fingers.iter().flat_map(|point| point.iter()).any(|value| !value.is_finite()) {
                 let why = format!("the points proposed on part {grasp} are not finite: {} and {}", fingers[0], fingers[1]);
@@ -193,7 +193,7 @@ impl<'a> Attempt<'a> {
         let now = self.simulation.object_state().world_from_parts;
         let mut crowded = Err(Failure::new(FailureStage::NoPlan, "no arm is free"));
         for (rank, arms) in assignments(self.scene, &self.held, &[&now, &self.goal_parts]).into_iter().enumerate() {
-            match self.choices(&arms, contacts, &mut stream) {
+            match time(Stage::Grasping, || self.choices(&arms, contacts, &mut stream)) {
                 Ok(Choices { roomy, .. }) if !roomy.is_empty() => return Ok(self.assign(&arms, roomy)),
                 Ok(choices) if crowded.is_err() => crowded = Ok((arms, choices.crowded)),
                 Err(failure) if rank == 0 => crowded = Err(failure),
@@ -265,7 +265,7 @@ impl<'a> Attempt<'a> {
         let mut stream = self.stream(Draw::Plan);
         let mut why = String::new();
         for grasps in choices {
-            match self.approach_to(&grasps, &mut stream) {
+            match time(Stage::Planning, || self.approach_to(&grasps, &mut stream)) {
                 Ok(approach) => return Ok((grasps, approach)),
                 Err(cause) => why = cause,
             }
@@ -324,14 +324,16 @@ impl<'a> Attempt<'a> {
             self.simulation.grips[usize::from(grasp.arm.0)] = Grip::Open(grasp.opening);
             self.grasps[usize::from(grasp.part.0)].world_from_gripper = Some(grasp.world_from_tool);
         }
-        self.simulation.follow(&approach.way, &moving, &self.config.motion)?;
-        self.simulation.follow(&approach.last_stretch, &moving, &self.config.motion)
+        time(Stage::Control, || {
+            self.simulation.follow(&approach.way, &moving, &self.config.motion)?;
+            self.simulation.follow(&approach.last_stretch, &moving, &self.config.motion)
+        })
     }
 
     /// Closes the grippers and checks by contact that each holds its part.
     pub(crate) fn take_hold(&mut self, grasps: &[Grasp]) -> Result<(), Failure> {
         self.note("close".to_owned());
-        self.simulation.close(grasps, &self.config.grasp)?;
+        time(Stage::Control, || self.simulation.close(grasps, &self.config.grasp))?;
         self.held.extend(grasps.iter().map(|grasp| (grasp.arm, grasp.part)));
         Ok(())
     }

@@ -4,6 +4,8 @@ use crate::attempt::Attempt;
 use crate::failure::Failure;
 use crate::grasping::{MAX_JOINT_STEP, ik_settings};
 use crate::planning_world::{Obstacles, collision_world};
+use crate::profile::{Stage, time};
+use crate::simulation::Simulation;
 use crate::task::{goal_errors, threshold_factor};
 use vmao_core::collision::CollisionChecker;
 use vmao_core::geometry::{Pose, rotation_distance};
@@ -32,7 +34,7 @@ impl Attempt<'_> {
         let routes = [vec![goal.clone()], vec![up_first, goal]];
         let mut blocked = Failure::new(FailureStage::NoPlan, "no route");
         for route in routes {
-            match self.plan_carry(&route[0]) {
+            match time(Stage::Planning, || self.plan_carry(&route[0])) {
                 Err(failure) => blocked = failure,
                 Ok(_) => {
                     let legs = route.len();
@@ -54,7 +56,7 @@ impl Attempt<'_> {
     }
 
     fn carry_to(&mut self, goal: &ObjectGoal, extra: f64) -> Result<(), Failure> {
-        let (trajectory, postures) = self.plan_carry(goal)?;
+        let (trajectory, postures) = time(Stage::Planning, || self.plan_carry(goal))?;
         self.note(format!("move the object, {} held", self.held.len()));
         let hold_from = trajectory.duration() + extra - self.config.thresholds.hold_seconds;
         let (held, motion) = (self.held.clone(), &self.config.motion);
@@ -62,7 +64,7 @@ impl Attempt<'_> {
         let (mut worst, mut errors) = (0.0_f64, self.errors);
         let holding: Vec<usize> = held.iter().map(|(arm, _)| usize::from(arm.0)).collect();
         let (all_held, measuring) = (held.len() == self.scene.object.parts.len(), &mut self.measuring);
-        let outcome = self.simulation.carry(&trajectory, &held, &postures, extra, motion, |simulation, time| {
+        let at_tick = |simulation: &Simulation<'_>, time: f64| {
             if all_held {
                 measuring.look(simulation, &holding, || trajectory.part_poses_at(time));
             }
@@ -70,7 +72,8 @@ impl Attempt<'_> {
                 errors = goal_errors(scene, goal_parts, wanted, &simulation.object_state());
                 worst = worst.max(threshold_factor(thresholds, &errors));
             }
-        });
+        };
+        let outcome = time(Stage::Control, || self.simulation.carry(&trajectory, &held, &postures, extra, motion, at_tick));
         self.errors = errors;
         self.factor = worst;
         outcome

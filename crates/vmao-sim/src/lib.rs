@@ -20,6 +20,7 @@ mod measures;
 mod mjcf;
 mod planning_world;
 mod portrait;
+pub mod profile;
 mod recorder;
 mod scene;
 mod simulation;

@@ -1,6 +1,7 @@
 //! A running scene: state in, torques out, one tick at a time.
 
 use crate::convention::{Data, body_pose, free_joint_position, hinge_jacobian, joint_vector, mass_block};
+use crate::profile::{Stage, time};
 use crate::recorder::Recorder;
 use crate::scene::{Owner, Scene};
 use nalgebra::Vector6;
@@ -76,7 +77,20 @@ impl<'s> Simulation<'s> {
 
     /// One control tick and one physics step: torques from the state at its start.
     pub(crate) fn tick(&mut self) {
-        self.data.step1();
+        time(Stage::Physics, || self.data.step1());
+        time(Stage::Control, || self.command());
+        time(Stage::Physics, || self.data.step2());
+        self.steps += 1;
+        if let Some(mut recorder) = self.recorder.take() {
+            recorder.observe(self);
+            self.recorder = Some(recorder);
+        }
+        #[cfg(test)]
+        crate::tests::after_tick(self);
+    }
+
+    /// Sets every actuator to what its arm's goal asks for.
+    fn command(&mut self) {
         if self.data.full_m(&mut self.full_mass).is_err() {
             // The buffer is nv × nv by construction.
             self.full_mass.fill(0.0);
@@ -90,14 +104,6 @@ impl<'s> Simulation<'s> {
             ctrl[index.ctrl..index.ctrl + 7].copy_from_slice(torque.as_slice());
             ctrl[index.ctrl + 7] = drive;
         }
-        self.data.step2();
-        self.steps += 1;
-        if let Some(mut recorder) = self.recorder.take() {
-            recorder.observe(self);
-            self.recorder = Some(recorder);
-        }
-        #[cfg(test)]
-        crate::tests::after_tick(self);
     }
 
     fn grip_force(&self, arm: usize) -> f64 {

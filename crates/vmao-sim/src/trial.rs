@@ -6,6 +6,7 @@ use crate::execution::MotionConfig;
 use crate::failure::Failure;
 use crate::grasping::GraspConfig;
 use crate::measures::MotionMeasures;
+use crate::profile::{self, Stage};
 use crate::scene::Scene;
 use crate::task::{GoalConfig, StartConfig, Thresholds};
 use serde::{Deserialize, Serialize};
@@ -68,9 +69,11 @@ pub fn run_trial(
     (seed, index): (u64, u64),
     recording: Recording,
 ) -> Trial {
-    let mut attempt = Attempt::begin(scene, config, order, (seed, index), recording);
-    let outcome = manipulate(&mut attempt, model, order);
-    attempt.finish(outcome)
+    profile::time(Stage::Rest, || {
+        let mut attempt = Attempt::begin(scene, config, order, (seed, index), recording);
+        let outcome = manipulate(&mut attempt, model, order);
+        attempt.finish(outcome)
+    })
 }
 
 fn manipulate(attempt: &mut Attempt<'_>, model: &dyn ContactModel, order: GraspOrder) -> Result<(), Failure> {

@@ -66,7 +66,21 @@ pub fn main(arguments: impl IntoIterator<Item = OsString>) -> ExitCode {
         Err(message) => return finish(print(message.render().to_string().trim_end()).map_err(Failure::from)),
     };
     let arguments: Vec<String> = arguments.iter().map(|argument| argument.to_string_lossy().into_owned()).collect();
-    finish(execute(line.command, &arguments))
+    let result = execute(line.command, &arguments);
+    if let Some(seconds) = vmao_sim::profile::seconds() {
+        log(&profile_table(&seconds));
+    }
+    finish(result)
+}
+
+/// Seconds and shares of the stages of all trials.
+fn profile_table(seconds: &[f64]) -> String {
+    let total: f64 = seconds.iter().sum();
+    let line = |(&(_, name), &spent): (&(_, &str), &f64)| {
+        format!("{name:<14} {spent:>9.2} s {:>6.1} %", if total > 0.0 { 100.0 * spent / total } else { 0.0 })
+    };
+    let lines: Vec<String> = vmao_sim::profile::Stage::ALL.iter().zip(seconds).map(line).collect();
+    format!("{}\n{:<14} {total:>9.2} s", lines.join("\n"), "all trials")
 }
 
 fn execute(command: Command, command_line: &[String]) -> Result<(), Failure> {

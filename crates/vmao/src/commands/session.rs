@@ -14,6 +14,7 @@ use std::{
     path::{Path, PathBuf},
     thread,
 };
+use vmao_sim::profile;
 
 /// The options that every command takes.
 #[derive(Debug, Clone, clap::Args)]
@@ -34,6 +35,9 @@ pub struct CommonOptions {
     /// Directory for what is written
     #[arg(long, value_name = "DIR")]
     pub out: Option<PathBuf>,
+    /// Say on stderr where the trials' time went
+    #[arg(long)]
+    pub profile: bool,
     /// One JSON document on stdout
     #[arg(long)]
     pub json: bool,
@@ -57,6 +61,9 @@ pub struct Session {
 impl Session {
     /// Resolves the options; a configuration that cannot be used is bad input.
     pub fn start(options: &CommonOptions, command_line: &[String]) -> Result<Self, Failure> {
+        if options.profile {
+            profile::start();
+        }
         let config = Config::load(options.config.as_deref(), &options.settings).or_bad_input()?;
         let info = RunInfo::new(command_line, options.seed, &config)?;
         let cores = || thread::available_parallelism().map_or(1, NonZeroUsize::get);
