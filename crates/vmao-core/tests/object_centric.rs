@@ -311,18 +311,18 @@ fn random_object(stream: &mut Stream, count: usize) -> ArticulatedObject {
     ArticulatedObject { name: "random".into(), parts: (0..count).map(part).collect(), joints }
 }
 
+/// Parts at x = 0 and x = 2 (m), joined half way between them, about z if the joint has an axis.
+fn two_parts(kind: JointKind) -> (WorldJoint, ObjectGraph, [Pose; 2]) {
+    let (parent, child) = (PartId(0), PartId(1));
+    let joint = WorldJoint { kind, parent, child, anchor: Point3::new(1.0, 0.0, 0.0), axis: Vector3::z_axis() };
+    let at = |x| pose([x, 0.0, 0.0], [1.0, 0.0, 0.0, 0.0]);
+    (joint, ObjectGraph::new(2, &[(parent, child)]).unwrap(), [at(0.0), at(2.0)])
+}
+
 #[test]
 fn a_hinge_opened_by_a_right_angle_has_its_textbook_poses() {
     // b is hinged to a at (1, 0, 0) about z; a quarter turn takes b's origin from (2, 0, 0) to (1, 1, 0).
-    let joint = WorldJoint {
-        kind: JointKind::Revolute,
-        parent: PartId(0),
-        child: PartId(1),
-        anchor: Point3::new(1.0, 0.0, 0.0),
-        axis: Vector3::z_axis(),
-    };
-    let graph = ObjectGraph::new(2, &[(PartId(0), PartId(1))]).unwrap();
-    let start = [pose([0.0; 3], [1.0, 0.0, 0.0, 0.0]), pose([2.0, 0.0, 0.0], [1.0, 0.0, 0.0, 0.0])];
+    let (joint, graph, start) = two_parts(JointKind::Revolute);
     let goals = goal_part_poses(&graph, &[joint], &start, &[PI / 2.0], PartId(0), &start[0]);
     assert!((goals[1].translation.vector - Vector3::new(1.0, 1.0, 0.0)).norm() < 1e-15);
     // With b the root and standing still, a turns the other way: its origin goes to (1, 1, 0) as well.
@@ -333,15 +333,7 @@ fn a_hinge_opened_by_a_right_angle_has_its_textbook_poses() {
 
 #[test]
 fn a_ball_joint_turned_about_its_anchor_has_its_textbook_poses() {
-    let joint = WorldJoint {
-        kind: JointKind::Ball,
-        parent: PartId(0),
-        child: PartId(1),
-        anchor: Point3::new(1.0, 0.0, 0.0),
-        axis: Vector3::z_axis(),
-    };
-    let graph = ObjectGraph::new(2, &[(PartId(0), PartId(1))]).unwrap();
-    let start = [pose([0.0; 3], [1.0, 0.0, 0.0, 0.0]), pose([2.0, 0.0, 0.0], [1.0, 0.0, 0.0, 0.0])];
+    let (joint, graph, start) = two_parts(JointKind::Ball);
     // A quarter turn about -y takes the child's arm from +x to +z; the axis of the joint plays no part.
     let quarter = [0.0, -PI / 2.0, 0.0];
     let goals = goal_part_poses(&graph, &[joint], &start, &quarter, PartId(0), &start[0]);
