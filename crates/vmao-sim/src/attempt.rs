@@ -49,6 +49,8 @@ const RESERVE_WAYPOINTS: usize = 4;
 pub(crate) struct Approach {
     way: Trajectory,
     last_stretch: Trajectory,
+    /// Where the parts were when it was planned: a part that hangs free may have moved since.
+    seen: Vec<Pose>,
 }
 
 /// A trial under way.
@@ -303,7 +305,7 @@ impl<'a> Attempt<'a> {
             })
             .collect();
         let last_stretch = Trajectory::new(&stretch, &self.limits(self.config.motion.approach_share), 0.01);
-        Ok(Approach { way, last_stretch })
+        Ok(Approach { way, last_stretch, seen: self.simulation.object_state().world_from_parts })
     }
 
     fn limits(&self, share: f64) -> MotionLimits {
@@ -325,8 +327,8 @@ impl<'a> Attempt<'a> {
             self.grasps[usize::from(grasp.part.0)].world_from_gripper = Some(grasp.world_from_tool);
         }
         time(Stage::Control, || {
-            self.simulation.follow(&approach.way, &moving, &self.config.motion)?;
-            self.simulation.follow(&approach.last_stretch, &moving, &self.config.motion)
+            self.simulation.follow(&approach.way, &moving, None, &self.config.motion)?;
+            self.simulation.follow(&approach.last_stretch, &moving, Some(&approach.seen), &self.config.motion)
         })
     }
 

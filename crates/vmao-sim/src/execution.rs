@@ -51,17 +51,26 @@ impl Simulation<'_> {
     }
 
     /// Follows a joint trajectory of all arms (flat) to its end; arms not in `moving` keep their goals.
+    ///
+    /// With `seen`, the parts' poses that the trajectory was made for, each gripper goes where its part is by now (Eq. 1).
     pub(crate) fn follow(
         &mut self,
         trajectory: &Trajectory,
         moving: &[(ArmId, PartId)],
+        seen: Option<&[Pose]>,
         motion: &MotionConfig,
     ) -> Result<(), Failure> {
         let ticks = (trajectory.duration() / self.scene.timestep).ceil() as u64;
         for tick in 1..=ticks {
             let (q, qd) = trajectory.at(tick as f64 * self.scene.timestep);
-            for (arm, _) in moving {
-                self.aim(usize::from(arm.0), &q, &qd);
+            let parts = seen.map(|_| self.object_state().world_from_parts);
+            for (arm, part) in moving {
+                let (arm, part) = (usize::from(arm.0), usize::from(part.0));
+                self.aim(arm, &q, &qd);
+                if let (Some(seen), Some(now)) = (seen, &parts) {
+                    let goal = &mut self.goals[arm].world_from_tool;
+                    *goal = gripper_goal(&seen[part], &now[part], goal);
+                }
             }
             self.tick();
             if self.steps.is_multiple_of(WATCH_EVERY) {

@@ -27,6 +27,7 @@ mod simulation;
 mod task;
 #[cfg(test)]
 mod tests;
+pub mod throughput;
 pub mod tracking;
 mod trial;
 
