@@ -26,7 +26,7 @@ pub(super) fn item(set: InstanceSet, instance: u16) -> CatalogueItem {
     let (frame_width, temple_width) = (stream.range(0.017, 0.020), stream.range(0.017, 0.020));
     let thickness = stream.range(0.021, 0.025);
     let lens_radius = stream.range(0.027, 0.031);
-    let (frame_mass, temple_mass) = (stream.range(0.09, 0.12), stream.range(0.05, 0.07));
+    let (frame_mass, temple_mass) = (stream.range(0.06, 0.08), stream.range(0.035, 0.045));
     let resistance = Resistance { damping: stream.range(0.006, 0.012), friction: stream.range(0.02, 0.035) };
     let palettes = [
         [[0.30, 0.16, 0.09], [0.45, 0.26, 0.14]],
