@@ -176,6 +176,7 @@ fn joint_element(xml: &mut String, joint: &Joint, from: PartId) {
     let kind = match joint.kind {
         JointKind::Revolute => "hinge",
         JointKind::Prismatic => "slide",
+        JointKind::Ball => "ball",
         JointKind::Fixed => return,
     };
     let limits = joint.limits.map_or_else(String::new, |[low, high]| format!(r#" range="{low} {high}""#));

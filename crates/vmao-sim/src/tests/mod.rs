@@ -6,6 +6,8 @@ mod control;
 mod internal_forces;
 mod inverse_kinematics;
 mod kinematics;
+mod object_trees;
+mod starts_and_goals;
 #[path = "../../tests/support/mod.rs"]
 mod support;
 mod witness;
