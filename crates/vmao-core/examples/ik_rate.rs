@@ -1,12 +1,12 @@
-//! Solve rate and mean time of inverse kinematics on random reachable poses.
+//! Solve rate and mean time of inverse kinematics on random reachable poses; time to find all branches, and to follow lines.
 
 #[path = "../tests/robots/mod.rs"]
 mod robots;
 
-use nalgebra::Vector3;
+use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 use vmao_core::{
     geometry::{Pose, interpolate, rotation_exp},
-    inverse_kinematics::{IkSettings, solve, solve_nearest, track},
+    inverse_kinematics::{IkOutcome, IkSettings, InverseKinematics, track},
     random::Stream,
 };
 
@@ -15,24 +15,37 @@ fn main() {
     for (name, chain, seed) in
         [("panda", robots::panda(), robots::PANDA_HOME), ("sawyer", robots::sawyer(), robots::SAWYER_NEUTRAL)]
     {
-        for trials in [1000, 10_000] {
+        let arm = InverseKinematics::new(chain.clone(), &IkSettings::default());
+        for trials in [1000, 100_000] {
             let mut stream = Stream::new(trials, &[]);
             let goals: Vec<_> = (0..trials).map(|_| chain.tool_pose(&chain.sample(&mut stream))).collect();
             let start = std::time::Instant::now();
-            let settings = IkSettings::default();
-            let solved =
-                goals.iter().filter(|goal| solve(&chain, goal, &seed, &settings, &mut stream).solution().is_some()).count();
+            let solved = goals.iter().filter(|goal| arm.solve(goal, &seed).solution().is_some()).count();
             let mean = start.elapsed().as_secs_f64() * 1e6 / trials as f64;
-            println!("{name}: {solved} of {trials} solved, {mean:.1} us each");
+            println!("{name}: {solved} of {trials} solved, {mean:.2} us each");
         }
         let mut stream = Stream::new(1, &[]);
-        let goals: Vec<_> = (0..1000).map(|_| chain.tool_pose(&chain.sample(&mut stream))).collect();
+        let goals: Vec<_> = (0..300).map(|_| chain.tool_pose(&chain.sample(&mut stream))).collect();
         let start = std::time::Instant::now();
-        let solved = goals
-            .iter()
-            .filter(|goal| solve_nearest(&chain, goal, &seed, 12, &IkSettings::default(), &mut stream).solution().is_some())
-            .count();
-        println!("{name}: nearest of 12, {solved} of 1000 solved, {:.1} us each", start.elapsed().as_secs_f64() * 1e3);
+        let branches: usize = goals.iter().map(|goal| arm.branches(goal, &seed).len()).sum();
+        let (mean, count) = (start.elapsed().as_secs_f64() * 1e6 / 300.0, branches as f64 / 300.0);
+        println!("{name}: {count:.2} branches a pose, {mean:.0} us a pose");
+
+        // poses of any orientation in a box around the arm, of which many are out of reach
+        let mut stream = Stream::new(3, &[]);
+        let mut counts = [0; 3];
+        for _ in 0..2000 {
+            let place = Vector3::new(stream.range(-1.2, 1.2), stream.range(-1.2, 1.2), stream.range(-0.6, 1.5));
+            let [w, x, y, z] = [0; 4].map(|_| stream.normal());
+            let goal = Pose::from_parts(place.into(), UnitQuaternion::from_quaternion(Quaternion::new(w, x, y, z)));
+            counts[match arm.solve(&goal, &seed) {
+                IkOutcome::Solved { .. } => 0,
+                IkOutcome::Unreachable { .. } => 1,
+                IkOutcome::NoSolution { .. } => 2,
+            }] += 1;
+        }
+        let [solved, proven, open] = counts;
+        println!("{name}: of 2000 poses in a box {solved} solved, {proven} proven out of reach, {open} neither");
 
         // lines of 15 cm with a turn of 45 degrees, from anywhere well inside the limits, in 60 steps
         let mut stream = Stream::new(2, &[]);
@@ -46,7 +59,7 @@ fn main() {
                 (from.translation.vector + way() * 0.15).into(),
                 rotation_exp(&(way() * std::f64::consts::FRAC_PI_4)) * from.rotation,
             );
-            if solve(&chain, &to, &start, &IkSettings::default(), &mut stream).solution().is_none() {
+            if arm.solve(&to, &start).solution().is_none() {
                 continue;
             }
             reachable += 1;

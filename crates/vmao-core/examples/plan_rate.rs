@@ -1,83 +1,80 @@
-//! Solve rate, time, length and validity of plans for one to three arms, with and without a shelf between them.
+//! Solve rate, time and length of plans for the problem sets: `plan_rate COUNT [shelf|crossed] [ROBOTS]...`
 
-#[path = "../tests/robots/mod.rs"]
-mod robots;
-
-use robots::problems::{add_shelf, problem, ring};
 use std::time::Instant;
 use vmao_core::{
     collision::CollisionChecker,
     planning::{PlanOutcome, PlanSettings, plan, time_path},
+    planning_problems::{Family, PlanningProblem},
     random::Stream,
+    robots::RobotModel,
     time_parameterization::MotionLimits,
 };
 
-#[expect(clippy::print_stdout, reason = "a measurement is printed")]
 fn main() {
-    for arms in 1..=3 {
-        let mut world = ring(arms);
-        add_shelf(&mut world);
-        let mut checker = CollisionChecker::new(&world);
-        let mut stream = Stream::new(3, &[]);
-        let samples: Vec<Vec<f64>> =
-            (0..20_000).map(|_| world.arms.iter().flat_map(|arm| arm.chain.sample(&mut stream)).collect()).collect();
-        let free: Vec<&Vec<f64>> = samples.iter().filter(|q| checker.is_free(q, 0.005)).collect();
-        let start = Instant::now();
-        let still = free.iter().filter(|q| checker.is_free(q, 0.005)).count();
-        let each = start.elapsed().as_secs_f64() * 1e6 / still as f64;
-        println!("{arms} arms: {} of {} samples free, a free check takes {each:.2} us", free.len(), samples.len());
-    }
-    let count = std::env::args().nth(1).and_then(|n| n.parse().ok()).unwrap_or(50_u64);
-    for (arms, shelf) in [(1, false), (2, false), (3, false), (1, true), (2, true), (3, true)] {
-        let mut timing = 0.0;
-        let (mut times, mut solved, mut valid, mut bent, mut seconds, mut timed, mut length) =
-            (Vec::new(), 0, 0, 0, 0.0, 0.0, 0.0);
-        for seed in 0..count {
-            let mut world = ring(arms);
-            if shelf {
-                add_shelf(&mut world);
-            }
-            let problem = problem(world, seed);
-            let start = Instant::now();
-            let mut stream = Stream::new(seed, &[]);
-            let outcome = plan(&problem.world, &problem.start, &problem.goal, &PlanSettings::default(), &mut stream);
-            times.push(start.elapsed().as_secs_f64() * 1e3);
-            let PlanOutcome::Path(path) = outcome else { continue };
-            solved += 1;
-            bent += u32::from(path.len() > 2);
-            let mut checker = CollisionChecker::new(&problem.world);
-            valid += u32::from(path.windows(2).all(|edge| {
-                let turn = edge[0].iter().zip(&edge[1]).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
-                let steps = (turn / 0.002).ceil() as usize;
-                (0..=steps).all(|i| {
-                    let t = i as f64 / steps as f64;
-                    let q: Vec<f64> = edge[0].iter().zip(&edge[1]).map(|(a, b)| a + t * (b - a)).collect();
-                    checker.is_free(&q, 0.0)
-                })
-            }));
-            length +=
-                path.windows(2).map(|e| e[0].iter().zip(&e[1]).map(|(a, b)| (a - b) * (a - b)).sum::<f64>().sqrt()).sum::<f64>();
-            let limits = MotionLimits { velocity: vec![2.1; 7 * arms], acceleration: vec![7.0; 7 * arms] };
-            let start = Instant::now();
-            let trajectory = time_path(&problem.world, &path, &limits, &PlanSettings::default());
-            timing += start.elapsed().as_secs_f64() * 1e3;
-            if let Some(trajectory) = trajectory {
-                timed += 1.0;
-                seconds += trajectory.duration();
+    let arguments: Vec<String> = std::env::args().skip(1).collect();
+    let count = arguments.first().and_then(|count| count.parse().ok()).unwrap_or(100);
+    let sets = ["panda", "panda,panda", "panda,panda,panda", "sawyer", "sawyer,sawyer", "sawyer,sawyer,sawyer", "panda,sawyer"];
+    let chosen = |name: &str, from: usize| arguments.len() <= from || arguments[from..].iter().any(|argument| argument == name);
+    for (name, family) in [("shelf", Family::Shelf), ("crossed", Family::Crossed)] {
+        for robots in sets {
+            if arguments.get(1).is_none_or(|wanted| wanted == name) && chosen(robots, 2) {
+                measure(name, family, robots, count);
             }
         }
-        times.sort_by(f64::total_cmp);
-        println!(
-            "{arms} arms{}: {solved}/{count} solved, {bent} not straight, {valid} valid at 0.002 rad, median {:.1} ms, 90 % {:.1} ms, \
-             max {:.0} ms, mean {:.1} ms; length {:.2} rad; {timed} timed, {:.2} s, {:.1} ms each",
-            if shelf { " and a shelf" } else { "" },
-            times[times.len() / 2],
-            times[times.len() * 9 / 10],
-            times[times.len() - 1],
-            times.iter().sum::<f64>() / times.len() as f64,
-            length / f64::from(solved),
-            seconds / timed,
-            timing / f64::from(solved),
-        );
     }
+}
+
+#[expect(clippy::print_stdout, reason = "a measurement is printed")]
+fn measure(name: &str, family: Family, robots: &str, count: u64) {
+    let models: Vec<RobotModel> = robots.split(',').filter_map(RobotModel::named).collect();
+    let start = Instant::now();
+    let problems: Vec<PlanningProblem> = (0..count).map(|index| PlanningProblem::new(family, &models, index)).collect();
+    let making = start.elapsed().as_secs_f64() / count as f64;
+    let (mut times, mut timing, mut duration) = (Vec::new(), 0.0, 0.0);
+    let (mut solved, mut straight, mut timed, mut length, mut checks) = (0, 0, 0, 0.0, 0.0);
+    for (index, problem) in problems.iter().enumerate() {
+        let world = problem.world();
+        let settings = PlanSettings::default();
+        let start = cpu_seconds();
+        let outcome = plan(&world, &problem.start, &problem.goal, &settings, &mut Stream::new(index as u64, &[]));
+        times.push((cpu_seconds() - start) * 1e3);
+        let PlanOutcome::Path(path) = outcome else { continue };
+        solved += 1;
+        straight += u32::from(path.len() == 2);
+        let distance = |e: &[Vec<f64>]| e[0].iter().zip(&e[1]).map(|(a, b)| (a - b) * (a - b)).sum::<f64>().sqrt();
+        length += path.windows(2).map(distance).sum::<f64>();
+        let start = Instant::now();
+        if let Some(trajectory) = time_path(&world, &path, &MotionLimits::of(&models), &settings) {
+            timed += 1;
+            duration += trajectory.duration();
+        }
+        timing += start.elapsed().as_secs_f64() * 1e3;
+        let mut checker = CollisionChecker::new(&world);
+        let start = Instant::now();
+        for point in &path {
+            std::hint::black_box(checker.is_free(point, 0.0));
+        }
+        checks += start.elapsed().as_secs_f64() * 1e6 / path.len() as f64;
+    }
+    times.sort_by(f64::total_cmp);
+    let n = times.len();
+    println!(
+        "{name} {robots}: {solved}/{n} solved, {straight} straight; plan ms median {:.2} mean {:.2} 95 % {:.2} max {:.1}; length {:.3} rad; \
+         {timed} timed, {:.2} s, in {:.1} ms; a check {:.2} us; making {:.0} ms",
+        times[n / 2],
+        times.iter().sum::<f64>() / n as f64,
+        times[n * 95 / 100],
+        times[n - 1],
+        length / f64::from(solved),
+        duration / f64::from(timed),
+        timing / f64::from(solved),
+        checks / f64::from(solved),
+        making * 1e3,
+    );
+}
+
+fn cpu_seconds() -> f64 {
+    std::thread::yield_now(); // the count is brought up to date when the scheduler is called
+    let text = std::fs::read_to_string("/proc/thread-self/schedstat").unwrap_or_default();
+    text.split(' ').next().and_then(|run| run.parse::<f64>().ok()).unwrap_or(f64::NAN) * 1e-9
 }

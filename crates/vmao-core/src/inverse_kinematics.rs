@@ -1,7 +1,15 @@
-//! Inverse kinematics inside the joint limits: damped least squares from a seed, then from random starts.
+//! Inverse kinematics inside the joint limits: damped least squares from stored, given and random starts.
+
+mod pieces;
+mod prepared;
+mod reach;
+mod self_motion;
+mod stored;
+
+pub use prepared::{Branch, InverseKinematics};
 
 use crate::{
-    damped_least_squares::{Attempt, Goal, LIMIT_ZONE, Solver},
+    damped_least_squares::{Attempt, Goal, LIMIT_ZONE, PATIENCE, Solver},
     geometry::Pose,
     joint_path::largest_turn,
     kinematics::{ChainJoint, SerialChain},
@@ -39,8 +47,17 @@ pub enum IkOutcome {
         /// Angle left (rad).
         rotation_error: f64,
     },
-    /// Nothing within the tolerances was found.
+    /// Nothing within the tolerances was found; there may be a solution.
     NoSolution {
+        /// The best angles seen (rad).
+        closest: Vec<f64>,
+        /// Their distance from the wanted position (m).
+        position_error: f64,
+        /// Their angle from the wanted orientation (rad).
+        rotation_error: f64,
+    },
+    /// It is proven that no configuration inside the limits reaches the pose within the tolerances.
+    Unreachable {
         /// The best angles seen (rad).
         closest: Vec<f64>,
         /// Their distance from the wanted position (m).
@@ -55,47 +72,15 @@ impl IkOutcome {
     pub fn solution(&self) -> Option<&[f64]> {
         match self {
             Self::Solved { joint_positions, .. } => Some(joint_positions),
-            Self::NoSolution { .. } => None,
+            Self::NoSolution { .. } | Self::Unreachable { .. } => None,
         }
     }
 }
 
-/// Angles that put the tool at `base_from_tool`: the first found, from `seed`, then from random starts in the limits.
+/// Up to `candidates` solutions from `seed` and from random starts, slid along their null spaces, without repetition.
 ///
-/// Panics if `seed` does not fit the chain or the chain has more than 8 joints.
-pub fn solve(chain: &SerialChain, base_from_tool: &Pose, seed: &[f64], settings: &IkSettings, stream: &mut Stream) -> IkOutcome {
-    let solver = Solver::new(chain, seed, settings);
-    let goal = Goal::new(base_from_tool);
-    let mut best = solver.descend(&goal, solver.joints(seed));
-    for _ in 0..settings.restarts {
-        if best.solved {
-            break;
-        }
-        let attempt = solver.descend(&goal, solver.joints(&chain.sample(stream)));
-        if attempt.solved || attempt.error.norm() < best.error.norm() {
-            best = attempt;
-        }
-    }
-    outcome(&best, solver.count)
-}
-
-/// Like [`solve`], but of up to `candidates` solutions the one of least [`posture_cost`], each slid along its null space.
-pub fn solve_nearest(
-    chain: &SerialChain,
-    base_from_tool: &Pose,
-    seed: &[f64],
-    candidates: usize,
-    settings: &IkSettings,
-    stream: &mut Stream,
-) -> IkOutcome {
-    let solver = Solver::new(chain, seed, settings);
-    let (found, closest) = gather(&solver, base_from_tool, seed, candidates, stream);
-    outcome(&found.first().map_or(closest, |&(_, attempt)| attempt), solver.count)
-}
-
-/// Distinct solutions among `candidates` found as by [`solve_nearest`], the nearest first.
-///
-/// An arm reaches a pose in several ways, and the nearest may collide or lead nowhere. Empty if the pose was not reached.
+/// Those of least [`posture_cost`] come first; a few, quickly, where [`InverseKinematics::branches`] looks for all.
+/// Empty if the pose was not reached.
 pub fn solutions(
     chain: &SerialChain,
     base_from_tool: &Pose,
@@ -105,42 +90,29 @@ pub fn solutions(
     stream: &mut Stream,
 ) -> Vec<Vec<f64>> {
     const DISTINCT: f64 = 0.1; // rad, of the most different joint
-    let solver = Solver::new(chain, seed, settings);
+    let solver = Solver::new(chain, settings);
+    let (goal, seed) = (Goal::new(base_from_tool), solver.joints(seed));
+    let (mut start, mut found) = (seed, Vec::new());
+    for _ in 0..=settings.restarts {
+        let attempt = solver.descend(&goal, start, settings.max_iterations, PATIENCE);
+        if attempt.solved {
+            let settled = solver.settle(&goal, attempt, &seed).q;
+            found.push((cost(&solver.joints, &settled, &seed), settled));
+            if found.len() >= candidates {
+                break;
+            }
+        }
+        start = solver.joints(&chain.sample(stream));
+    }
+    found.sort_by(|a, b| a.0.total_cmp(&b.0));
     let mut kept: Vec<Vec<f64>> = Vec::new();
-    for (_, attempt) in gather(&solver, base_from_tool, seed, candidates, stream).0 {
-        let q = &attempt.q[..solver.count];
+    for (_, q) in found {
+        let q = &q[..solver.count()];
         if kept.iter().all(|other| largest_turn(other, q) > DISTINCT) {
             kept.push(q.to_vec());
         }
     }
     kept
-}
-
-/// Up to `candidates` solutions with their cost, cheapest first, and the nearest miss.
-fn gather(
-    solver: &Solver<'_>,
-    base_from_tool: &Pose,
-    seed: &[f64],
-    candidates: usize,
-    stream: &mut Stream,
-) -> (Vec<(f64, Attempt)>, Attempt) {
-    let goal = Goal::new(base_from_tool);
-    let mut closest = solver.descend(&goal, solver.joints(seed));
-    let (mut attempt, mut found) = (closest, Vec::new());
-    for _ in 0..=solver.settings.restarts {
-        if attempt.solved {
-            let settled = solver.settle(&goal, attempt, seed);
-            found.push((posture_cost(solver.chain, &settled.q[..solver.count], seed), settled));
-            if found.len() >= candidates {
-                break;
-            }
-        } else if attempt.error.norm() < closest.error.norm() {
-            closest = attempt;
-        }
-        attempt = solver.descend(&goal, solver.joints(&solver.chain.sample(stream)));
-    }
-    found.sort_by(|a, b| a.0.total_cmp(&b.0));
-    (found, closest)
 }
 
 /// Joint positions that take the tool through `poses` one after the other from `start`, without a jump.
@@ -154,7 +126,7 @@ pub fn track(
     max_joint_step: f64,
     settings: &IkSettings,
 ) -> Result<Vec<Vec<f64>>, usize> {
-    let solver = Solver::new(chain, start, settings);
+    let solver = Solver::new(chain, settings);
     let mut q = solver.joints(start);
     let mut path = Vec::with_capacity(poses.len());
     for (index, pose) in poses.iter().enumerate() {
@@ -164,7 +136,7 @@ pub fn track(
             return Err(index);
         }
         q = attempt.q;
-        path.push(q[..solver.count].to_vec());
+        path.push(q[..solver.count()].to_vec());
     }
     Ok(path)
 }
@@ -173,21 +145,32 @@ pub fn track(
 ///
 /// rᵢ is the width of the limits and mᵢ their middle: a joint at its limit costs as much as one turned through its range.
 pub fn posture_cost(chain: &SerialChain, q: &[f64], seed: &[f64]) -> f64 {
+    cost(&chain.joints, q, seed)
+}
+
+pub(crate) fn cost(joints: &[ChainJoint], q: &[f64], seed: &[f64]) -> f64 {
     let cost = |((joint, &angle), &wanted): ((&ChainJoint, &f64), &f64)| {
         let (range, middle) = (joint.upper - joint.lower, (joint.upper + joint.lower) / 2.0);
         let crowding = ((2.0 * (angle - middle) / range).abs() - LIMIT_ZONE).max(0.0) / (1.0 - LIMIT_ZONE);
         ((angle - wanted) / range).powi(2) + crowding * crowding
     };
-    chain.joints.iter().zip(q).zip(seed).map(cost).sum()
+    joints.iter().zip(q).zip(seed).map(cost).sum()
 }
 
-fn outcome(attempt: &Attempt, count: usize) -> IkOutcome {
-    let joint_positions = attempt.q[..count].to_vec();
-    let position_error = attempt.error.fixed_rows::<3>(0).norm();
-    let rotation_error = attempt.error.fixed_rows::<3>(3).norm();
+/// What an attempt amounts to; `proven` says of one that failed whether nothing could have succeeded.
+fn outcome(attempt: &Attempt, count: usize, proven: impl FnOnce() -> bool) -> IkOutcome {
+    // sums of squares of far targets overflow, and an error is a number
+    let size = |first: usize| {
+        let [x, y, z] = [0, 1, 2].map(|i| attempt.error[first + i]);
+        let norm = x.hypot(y).hypot(z);
+        if norm.is_finite() { norm } else { f64::MAX }
+    };
+    let (closest, position_error, rotation_error) = (attempt.q[..count].to_vec(), size(0), size(3));
     if attempt.solved {
-        IkOutcome::Solved { joint_positions, position_error, rotation_error }
+        IkOutcome::Solved { joint_positions: closest, position_error, rotation_error }
+    } else if proven() {
+        IkOutcome::Unreachable { closest, position_error, rotation_error }
     } else {
-        IkOutcome::NoSolution { closest: joint_positions, position_error, rotation_error }
+        IkOutcome::NoSolution { closest, position_error, rotation_error }
     }
 }

@@ -54,8 +54,11 @@ impl Tree {
     }
 }
 
-/// The configuration a `fraction` of the way.
+/// The configuration a `fraction` of the way, exactly `to` at 1.
 pub(crate) fn blend(from: &[f64], to: &[f64], fraction: f64) -> Vec<f64> {
+    if fraction == 1.0 {
+        return to.to_vec();
+    }
     from.iter().zip(to).map(|(a, b)| a + (b - a) * fraction).collect()
 }
 

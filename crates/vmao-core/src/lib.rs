@@ -6,8 +6,10 @@
 
 pub mod catalogue;
 pub mod collision;
+mod collision_checker;
 pub mod contact;
 pub mod contact_model;
+mod coordination;
 mod damped_least_squares;
 pub mod distance;
 pub mod geometry;
@@ -23,11 +25,14 @@ pub mod order;
 pub mod osc;
 pub mod outcome;
 pub mod planning;
+pub mod planning_problems;
 pub mod random;
 pub mod record;
 pub mod robots;
 pub mod rollout;
 pub mod shape;
+mod small_systems;
+mod swept;
 pub mod time_parameterization;
 
 /// The code in the README, compiled and run with the documentation tests.

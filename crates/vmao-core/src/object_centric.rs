@@ -1,15 +1,16 @@
 //! Object-centric control (OCAO; supplement, appendix A, Eq. 1 and 2).
 //!
 //! From the motion of one part and the changes of all joints to the motion of every part and every gripper.
-//! Axes and anchors are those before the motion, in the world frame.
+//! Axes and anchors are those before the motion, in the world frame. Positions and changes of joints are flat lists: one
+//! coordinate a joint, three of a rotation vector a ball joint.
 
 use crate::{
     contact::PartId,
-    geometry::{Pose, interpolate, minimum_jerk},
-    object::{ArticulatedObject, Joint, JointKind, ObjectGoal, ObjectState},
-    object_graph::{ObjectGraph, Step},
+    geometry::{Pose, interpolate, minimum_jerk, rotation_exp, rotation_log},
+    object::{ArticulatedObject, Joint, JointKind, ObjectGoal, ObjectState, by_joint},
+    object_graph::{Direction, ObjectGraph, Step},
 };
-use nalgebra::{Point3, Translation3, Unit, UnitQuaternion, Vector3};
+use nalgebra::{Point3, Unit, UnitQuaternion, Vector3};
 use std::f64::consts::TAU;
 
 /// A joint as it lies in the world in the current configuration.
@@ -21,27 +22,30 @@ pub struct WorldJoint {
     pub parent: PartId,
     /// The part that moves for a positive change.
     pub child: PartId,
-    /// A point on the axis, world frame (m).
+    /// A point on the axis, or the centre of a ball joint, world frame (m).
     pub anchor: Point3<f64>,
-    /// The axis, world frame.
+    /// The axis, world frame; ignored by joints that have none.
     pub axis: Unit<Vector3<f64>>,
 }
 
 impl WorldJoint {
-    /// The rigid motion that a change of the joint by `delta` (rad or m) gives the child while the parent stands still.
-    pub fn motion(&self, delta: f64) -> Pose {
-        joint_motion(self.kind, &self.anchor, &self.axis, delta)
+    /// The rigid motion that a change of the joint gives the child while the parent stands still.
+    ///
+    /// `delta` in rad or m; of a ball joint, the rotation vector of the child's turn in the world frame.
+    pub fn motion(&self, delta: &[f64]) -> Pose {
+        joint_motion(self.kind, &self.anchor, &self.axis, Direction::ParentToChild, delta)
     }
 }
 
-/// R(d, δ) about the axis through `anchor`, or a slide by δ along it; a fixed joint never moves.
-fn joint_motion(kind: JointKind, anchor: &Point3<f64>, axis: &Unit<Vector3<f64>>, delta: f64) -> Pose {
+/// W(δ): R(d, δ) about the axis through `anchor`, a slide by δ along it, or a turn by exp(δ) about `anchor`; a fixed joint
+/// never moves. W(−δ), its inverse, where the joint is walked from child to parent.
+fn joint_motion(kind: JointKind, anchor: &Point3<f64>, axis: &Unit<Vector3<f64>>, direction: Direction, delta: &[f64]) -> Pose {
+    let sign = direction.sign();
+    let about = |turn: UnitQuaternion<f64>| Pose::from_parts((anchor.coords - turn * anchor.coords).into(), turn);
     match kind {
-        JointKind::Revolute => {
-            let turn = UnitQuaternion::from_axis_angle(axis, delta);
-            Pose::from_parts(Translation3::from(anchor.coords - turn * anchor.coords), turn)
-        }
-        JointKind::Prismatic => Pose::from_parts(Translation3::from(axis.into_inner() * delta), UnitQuaternion::identity()),
+        JointKind::Revolute => about(UnitQuaternion::from_axis_angle(axis, sign * delta[0])),
+        JointKind::Ball => about(rotation_exp(&(Vector3::from_column_slice(delta) * sign))),
+        JointKind::Prismatic => Pose::from_parts((axis.into_inner() * (sign * delta[0])).into(), UnitQuaternion::identity()),
         JointKind::Fixed => Pose::identity(),
     }
 }
@@ -57,7 +61,8 @@ pub fn gripper_goal(world_from_part: &Pose, goal_world_from_part: &Pose, world_f
 /// the joint's motion about its axis before the motion; W(−δ) where the edge is walked from child to parent.
 ///
 /// # Shapes
-/// `joints` and `joint_deltas` (rad or m) by joint, `world_from_parts` and the result by part. Panics on other lengths.
+/// `joints` by joint, `joint_deltas` flat as for [`WorldJoint::motion`], `world_from_parts` and the result by part. Panics
+/// on other lengths.
 pub fn goal_part_poses(
     graph: &ObjectGraph,
     joints: &[WorldJoint],
@@ -78,12 +83,13 @@ fn outward_poses(
     root: PartId,
     goal_world_from_root: &Pose,
 ) -> Vec<Pose> {
-    assert_eq!(joints.len(), joint_deltas.len(), "one change for each joint");
+    let deltas = by_joint(joints.iter().map(|joint| joint.kind), joint_deltas);
     let root = usize::from(root.0);
     let mut motions = vec![Pose::identity(); world_from_parts.len()];
     motions[root] = goal_world_from_root * world_from_parts[root].inverse();
     for step in steps {
-        let relative = joints[step.joint].motion(step.direction.sign() * joint_deltas[step.joint]);
+        let joint = &joints[step.joint];
+        let relative = joint_motion(joint.kind, &joint.anchor, &joint.axis, step.direction, deltas[step.joint]);
         let mut motion = motions[usize::from(step.from.0)] * relative;
         motion.rotation.renormalize();
         motions[usize::from(step.to.0)] = motion;
@@ -110,7 +116,7 @@ pub fn world_joints(object: &ArticulatedObject, world_from_parts: &[Pose]) -> Ve
     object.joints.iter().map(place).collect()
 }
 
-/// World pose of every part with the root at `world_from_root` and the joints at `joint_positions` (rad or m).
+/// World pose of every part with the root at `world_from_root` and the joints at `joint_positions` (rad or m, flat).
 pub fn part_poses(
     object: &ArticulatedObject,
     graph: &ObjectGraph,
@@ -118,22 +124,23 @@ pub fn part_poses(
     world_from_root: &Pose,
     joint_positions: &[f64],
 ) -> Vec<Pose> {
-    assert_eq!(joint_positions.len(), object.joints.len(), "one position for each joint");
+    let positions = by_joint(object.joints.iter().map(|joint| joint.kind), joint_positions);
     let mut world_from_parts = vec![*world_from_root; object.parts.len()];
     for step in graph.outward(root) {
         let joint = &object.joints[step.joint];
-        let position = step.direction.sign() * joint_positions[step.joint];
-        world_from_parts[usize::from(step.to.0)] =
-            world_from_parts[usize::from(step.from.0)] * joint_motion(joint.kind, &joint.anchor, &joint.axis, position);
+        world_from_parts[usize::from(step.to.0)] = world_from_parts[usize::from(step.from.0)]
+            * joint_motion(joint.kind, &joint.anchor, &joint.axis, step.direction, positions[step.joint]);
     }
     world_from_parts
 }
 
-/// Position of every joint (rad or m), measured from part poses; zero for a fixed joint.
+/// Position of every joint (rad or m, flat), measured from part poses; zero for a fixed joint.
 ///
-/// A revolute joint's angle is the twist about its axis, on the turn nearest to the middle of its limits (else to zero).
+/// A revolute joint's angle is the twist about its axis, on the turn nearest to the middle of its limits (else to zero). A
+/// ball joint's rotation vector is the shortest, of at most π.
 pub fn joint_positions(object: &ArticulatedObject, world_from_parts: &[Pose]) -> Vec<f64> {
-    let measure = |joint: &Joint| {
+    let mut positions = Vec::with_capacity(object.joints.len());
+    for joint in &object.joints {
         let parent_from_child =
             world_from_parts[usize::from(joint.parent.0)].inv_mul(&world_from_parts[usize::from(joint.child.0)]);
         match joint.kind {
@@ -141,13 +148,46 @@ pub fn joint_positions(object: &ArticulatedObject, world_from_parts: &[Pose]) ->
                 let turn = parent_from_child.rotation.quaternion();
                 let angle = 2.0 * turn.imag().dot(&joint.axis).atan2(turn.w);
                 let middle = joint.limits.map_or(0.0, |[lower, upper]| (lower + upper) / 2.0);
-                angle + TAU * ((middle - angle) / TAU).round()
+                positions.push(angle + TAU * ((middle - angle) / TAU).round());
             }
-            JointKind::Prismatic => parent_from_child.translation.vector.dot(&joint.axis),
-            JointKind::Fixed => 0.0,
+            JointKind::Ball => positions.extend(rotation_log(&parent_from_child.rotation).iter()),
+            JointKind::Prismatic => positions.push(parent_from_child.translation.vector.dot(&joint.axis)),
+            JointKind::Fixed => positions.push(0.0),
         }
-    };
-    object.joints.iter().map(measure).collect()
+    }
+    positions
+}
+
+/// The turn from one position of a ball joint to another, as a rotation vector in its parent's frame: log(exp b exp(−a)).
+pub fn ball_change(from: &[f64], to: &[f64]) -> Vector3<f64> {
+    let turn = |position: &[f64]| rotation_exp(&Vector3::from_column_slice(position));
+    rotation_log(&(turn(to) * turn(from).inverse()))
+}
+
+/// The changes that take the joints from one position to another, flat as for [`WorldJoint::motion`].
+///
+/// `world_from_parts` are the parts' poses before the change: a ball joint's turn rides on its parent.
+pub fn joint_deltas(object: &ArticulatedObject, world_from_parts: &[Pose], from: &[f64], to: &[f64]) -> Vec<f64> {
+    let mut deltas = Vec::with_capacity(from.len());
+    for ((joint, from), (_, to)) in object.positions_by_joint(from).zip(object.positions_by_joint(to)) {
+        if joint.kind == JointKind::Ball {
+            let world_from_parent = world_from_parts[usize::from(joint.parent.0)].rotation;
+            deltas.extend((world_from_parent * ball_change(from, to)).iter());
+        } else {
+            deltas.push(to[0] - from[0]);
+        }
+    }
+    deltas
+}
+
+/// How far each joint is from where it shall be (rad or m, none negative): one number a joint, also a ball joint.
+pub fn joint_errors(object: &ArticulatedObject, wanted: &[f64], is: &[f64]) -> Vec<f64> {
+    let both = object.positions_by_joint(wanted).zip(object.positions_by_joint(is));
+    both.map(|((joint, wanted), (_, is))| match joint.kind {
+        JointKind::Ball => ball_change(is, wanted).norm(),
+        JointKind::Revolute | JointKind::Prismatic | JointKind::Fixed => (wanted[0] - is[0]).abs(),
+    })
+    .collect()
 }
 
 /// The motion of an object from where it really is to its goal, minimum-jerk in time.
@@ -158,6 +198,8 @@ pub struct ObjectTrajectory {
     start: ObjectState,
     goal: ObjectGoal,
     joints: Vec<WorldJoint>,
+    /// Of the whole motion.
+    deltas: Vec<f64>,
     steps: Vec<Step>,
     duration: f64,
 }
@@ -166,10 +208,10 @@ impl ObjectTrajectory {
     /// The motion from `start` to `goal` within `duration` (s, positive).
     pub fn new(object: &ArticulatedObject, graph: &ObjectGraph, start: ObjectState, goal: ObjectGoal, duration: f64) -> Self {
         assert!(duration > 0.0, "a motion needs time, not {duration} s");
-        assert_eq!(start.joint_positions.len(), goal.joint_positions.len(), "start and goal of the same joints");
         let joints = world_joints(object, &start.world_from_parts);
+        let deltas = joint_deltas(object, &start.world_from_parts, &start.joint_positions, &goal.joint_positions);
         let steps = graph.outward(goal.root);
-        Self { start, goal, joints, steps, duration }
+        Self { start, goal, joints, deltas, steps, duration }
     }
 
     /// How long the motion lasts (s).
@@ -177,11 +219,22 @@ impl ObjectTrajectory {
         self.duration
     }
 
-    /// Position of every joint (rad or m) at `time` (s), held before zero and after the duration.
+    /// Position of every joint (rad or m, flat) at `time` (s), held before zero and after the duration.
     pub fn joint_positions_at(&self, time: f64) -> Vec<f64> {
         let fraction = minimum_jerk(time, self.duration);
-        let ends = self.start.joint_positions.iter().zip(&self.goal.joint_positions);
-        ends.map(|(start, goal)| start + fraction * (goal - start)).collect()
+        let kinds = || self.joints.iter().map(|joint| joint.kind);
+        let ends = by_joint(kinds(), &self.start.joint_positions).into_iter().zip(by_joint(kinds(), &self.goal.joint_positions));
+        let mut positions = Vec::with_capacity(self.deltas.len());
+        for (kind, (start, goal)) in kinds().zip(ends) {
+            if kind == JointKind::Ball {
+                let part_way = rotation_exp(&(ball_change(start, goal) * fraction));
+                let position = rotation_log(&(part_way * rotation_exp(&Vector3::from_column_slice(start))));
+                positions.extend(position.iter());
+            } else {
+                positions.push(start[0] + fraction * (goal[0] - start[0]));
+            }
+        }
+        positions
     }
 
     /// World pose of every part at `time` (s), held before zero and after the duration.
@@ -189,8 +242,7 @@ impl ObjectTrajectory {
         let fraction = minimum_jerk(time, self.duration);
         let root_start = &self.start.world_from_parts[usize::from(self.goal.root.0)];
         let world_from_root = interpolate(root_start, &self.goal.world_from_root, fraction);
-        let ends = self.start.joint_positions.iter().zip(&self.goal.joint_positions);
-        let deltas: Vec<f64> = ends.map(|(start, goal)| fraction * (goal - start)).collect();
+        let deltas: Vec<f64> = self.deltas.iter().map(|delta| fraction * delta).collect();
         outward_poses(&self.steps, &self.joints, &self.start.world_from_parts, &deltas, self.goal.root, &world_from_root)
     }
 }

@@ -1,27 +1,28 @@
-//! Motion planning for all arms together: straight line, one arm at a time, then RRT-Connect, then shortcuts.
+//! Motion planning for all arms together: straight line, arms one by one, RRT-Connect in all joints, then shortcuts.
 //!
-//! RRT-Connect is Kuffner & LaValle, ICRA 2000, in the joint space of all arms at once. Edges are checked at
-//! `PlanSettings::step`; a finished path is checked again five times finer, and planned anew at a finer step if it fails.
+//! RRT-Connect is Kuffner & LaValle, ICRA 2000, in the joint space of all arms at once. Edges are checked without gaps
+//! ([`CollisionChecker::edge_is_free`]): a path is clear by half the margin everywhere, not only at samples.
 
 use crate::{
     collision::{CollisionChecker, CollisionPair, CollisionWorld},
     joint_path::{Tree, at_length, blend, distance, largest_turn, length, remove_collinear},
     random::Stream,
+    swept::Scope,
     time_parameterization::{MotionLimits, Trajectory},
 };
-use std::fmt;
+use std::{fmt, ops::Range};
 
 /// How hard to look for a path and how closely to check it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PlanSettings {
-    /// Most any joint turns between two collision checks while planning (rad); the result is checked five times finer.
-    pub step: f64,
     /// Longest new branch of a tree, by its most moved joint (rad).
     pub extension: f64,
     /// Most random samples.
     pub max_iterations: usize,
-    /// Attempts to shorten the path.
+    /// Most attempts to shorten a path.
     pub shortcut_iterations: usize,
+    /// Shortening ends after this many attempts in succession that gained less than a thousandth.
+    pub shortcut_patience: usize,
     /// Least distance between things that must not touch (m).
     pub margin: f64,
     /// Arms that stay at their start; they are in the way of the others, but may keep the contacts they have.
@@ -30,8 +31,9 @@ pub struct PlanSettings {
 
 impl Default for PlanSettings {
     fn default() -> Self {
-        let (step, extension, margin) = (0.05, 0.6, 0.005);
-        Self { step, extension, max_iterations: 20_000, shortcut_iterations: 150, margin, frozen_arms: Vec::new() }
+        let (extension, margin) = (0.6, 0.005);
+        let (shortcut_iterations, shortcut_patience) = (150, 6);
+        Self { extension, max_iterations: 20_000, shortcut_iterations, shortcut_patience, margin, frozen_arms: Vec::new() }
     }
 }
 
@@ -51,8 +53,19 @@ pub enum PlanFailure {
     StartInCollision(CollisionPair),
     /// The goal is closer than the margin to a collision.
     GoalInCollision(CollisionPair),
-    /// The start or the goal is outside the joint limits.
-    OutOfLimits,
+    /// The start is outside the joint limits by more than [`START_TOLERANCE`], or the goal is outside.
+    OutOfLimits {
+        /// Whether it is the goal.
+        at_goal: bool,
+        /// Index of the arm.
+        arm: usize,
+        /// Index of the joint in its arm.
+        joint: usize,
+        /// Its angle (rad).
+        angle: f64,
+        /// Lowest and highest angle (rad).
+        range: [f64; 2],
+    },
     /// No path was found in `max_iterations` samples; this does not say that there is none.
     BudgetExhausted,
 }
@@ -62,57 +75,59 @@ impl fmt::Display for PlanFailure {
         match self {
             Self::StartInCollision(pair) => write!(f, "at the start, {pair}"),
             Self::GoalInCollision(pair) => write!(f, "at the end, {pair}"),
-            Self::OutOfLimits => write!(f, "start or end outside the joint limits"),
-            Self::BudgetExhausted => write!(f, "no path within the budget of samples"),
+            Self::OutOfLimits { at_goal, arm, joint, angle, range: [low, high] } => {
+                let end = if *at_goal { "end" } else { "start" };
+                write!(f, "at the {end}, joint {} of arm {arm} is at {angle} rad, outside its limits [{low}, {high}]", joint + 1)
+            }
+            Self::BudgetExhausted => write!(f, "no path found within the budget of samples; there may be one"),
         }
     }
 }
 
+/// How far outside its limits a joint may start (rad): controllers overshoot by less.
+pub const START_TOLERANCE: f64 = 0.01;
+
 /// A collision-free path of all arms from `start` to `goal` (flat, arm after arm, rad).
 ///
-/// A frozen arm stays at its start whatever the goal says. Panics if `start` or `goal` has not one angle per joint.
+/// A joint that starts outside its limits by at most [`START_TOLERANCE`] starts at the limit: the path's first point may
+/// differ from `start` by that. A frozen arm stays at its start, wherever that is and whatever the goal says. Panics if
+/// `start` or `goal` has not one angle per joint.
 pub fn plan(world: &CollisionWorld, start: &[f64], goal: &[f64], settings: &PlanSettings, stream: &mut Stream) -> PlanOutcome {
     let mut planner = Planner::new(world, settings);
     assert!(start.len() == planner.free.len() && goal.len() == start.len(), "one angle per joint of all arms");
+    let start: Vec<f64> = (0..start.len()).map(|i| planner.start_angle(i, start[i])).collect();
     let goal: Vec<f64> = (0..start.len()).map(|i| if planner.free[i] { goal[i] } else { start[i] }).collect();
-    if !world.within_limits(start) || !world.within_limits(&goal) {
-        return PlanOutcome::Failed(PlanFailure::OutOfLimits);
+    for (at_goal, q) in [(false, &start), (true, &goal)] {
+        if let Some(failure) = planner.out_of_limits(at_goal, q) {
+            return PlanOutcome::Failed(failure);
+        }
     }
-    if let Some(pair) = planner.checker.check(start, settings.margin) {
+    if let Some(pair) = planner.checker.check(&start, settings.margin) {
         return PlanOutcome::Failed(PlanFailure::StartInCollision(pair));
     }
     if let Some(pair) = planner.checker.check(&goal, settings.margin) {
         return PlanOutcome::Failed(PlanFailure::GoalInCollision(pair));
     }
-    let finest = settings.step / FINER;
-    for step in [settings.step, settings.step / 2.0, finest] {
-        planner.step = step;
-        let Some(mut path) = planner.find(start, &goal, stream) else { break };
-        planner.shorten(&mut path, stream);
-        planner.step = finest;
-        if step == finest || planner.is_free(&path) {
-            return PlanOutcome::Path(path);
+    match planner.find(&start, &goal, stream) {
+        Some(mut path) => {
+            planner.shorten(&mut path, stream);
+            PlanOutcome::Path(path)
         }
+        None => PlanOutcome::Failed(PlanFailure::BudgetExhausted),
     }
-    PlanOutcome::Failed(PlanFailure::BudgetExhausted)
 }
 
 /// The first edge of `path` that comes closer to a collision than the margin, and what collides there.
 ///
-/// For paths made elsewhere, such as tracked lines of the tool; checked at a fifth of `settings.step`, like plans.
-/// Panics if a waypoint has not one angle per joint.
+/// For paths made elsewhere, such as tracked lines of the tool; checked without gaps, like plans. Panics if a waypoint has
+/// not one angle per joint.
 pub fn first_collision(world: &CollisionWorld, path: &[Vec<f64>], settings: &PlanSettings) -> Option<(usize, CollisionPair)> {
     let mut checker = CollisionChecker::with_frozen(world, &settings.frozen_arms);
     if let Some(pair) = path.first().and_then(|start| checker.check(start, settings.margin)) {
         return Some((0, pair));
     }
-    path.windows(2).enumerate().find_map(|(edge, ends)| {
-        let count = (largest_turn(&ends[0], &ends[1]) / settings.step * FINER).ceil().max(1.0) as usize;
-        (1..=count).find_map(|i| {
-            let pair = checker.check(&blend(&ends[0], &ends[1], i as f64 / count as f64), settings.margin)?;
-            Some((edge, pair))
-        })
-    })
+    let hit = |(edge, ends): (usize, &[Vec<f64>])| Some((edge, checker.check_edge(&ends[0], &ends[1], settings.margin)?));
+    path.windows(2).enumerate().find_map(hit)
 }
 
 /// Times a path, cutting its corners as widely as stays free of collision by half the margin, sampled every 5 ms.
@@ -134,15 +149,12 @@ pub fn time_path(
     })
 }
 
-/// How many times finer than `PlanSettings::step` a finished path is checked.
-const FINER: f64 = 5.0;
-
-struct Planner<'a> {
+pub(crate) struct Planner<'a> {
     world: &'a CollisionWorld,
     settings: &'a PlanSettings,
+    /// The pairs that count now.
+    scope: Scope,
     checker: CollisionChecker<'a>,
-    step: f64,
-    samples_left: usize,
     /// Whether each joint may move.
     free: Vec<bool>,
     /// The arm of each joint.
@@ -156,49 +168,82 @@ impl<'a> Planner<'a> {
         Self {
             world,
             settings,
+            scope: Scope::All,
             checker: CollisionChecker::with_frozen(world, &settings.frozen_arms),
-            step: settings.step,
-            samples_left: settings.max_iterations,
             free: arms().map(|(arm, _)| !settings.frozen_arms.contains(&arm)).collect(),
             arm_of: arms().map(|(arm, _)| arm).collect(),
             limits: arms().map(|(_, joint)| [joint.lower, joint.upper]).collect(),
         }
     }
 
+    /// The angle joint `i` starts at: one a little outside its limits is at the limit, those of frozen arms stay.
+    fn start_angle(&self, i: usize, angle: f64) -> f64 {
+        let [low, high] = self.limits[i];
+        let inside = angle.clamp(low, high);
+        if self.free[i] && (inside - angle).abs() <= START_TOLERANCE { inside } else { angle }
+    }
+
+    fn out_of_limits(&self, at_goal: bool, q: &[f64]) -> Option<PlanFailure> {
+        let outside = |&i: &usize| self.free[i] && !(self.limits[i][0]..=self.limits[i][1]).contains(&q[i]);
+        let i = (0..q.len()).find(outside)?;
+        let (arm, range) = (self.arm_of[i], self.limits[i]);
+        let joint = self.arm_of[..i].iter().filter(|&&other| other == arm).count();
+        Some(PlanFailure::OutOfLimits { at_goal, arm, joint, angle: q[i], range })
+    }
+
     fn find(&mut self, start: &[f64], goal: &[f64], stream: &mut Stream) -> Option<Vec<Vec<f64>>> {
         if self.edge_is_free(start, goal) {
             return Some(vec![start.to_vec(), goal.to_vec()]);
         }
-        self.one_arm_after_the_other(start, goal).or_else(|| self.grow_trees(start, goal, stream))
-    }
-
-    /// Tries to move whole arms in turn, in every order: cheap, and often all that crossed arms need.
-    fn one_arm_after_the_other(&mut self, start: &[f64], goal: &[f64]) -> Option<Vec<Vec<f64>>> {
-        const MOST_ARMS: usize = 4; // 24 orders
-        let moves = |&arm: &usize| (0..start.len()).any(|i| self.arm_of[i] == arm && start[i] != goal[i]);
-        let arms: Vec<usize> = (0..self.world.arms.len()).filter(moves).collect();
-        if arms.len() < 2 || arms.len() > MOST_ARMS {
-            return None;
-        }
-        orders(&arms).into_iter().find_map(|order| {
-            let mut path = vec![start.to_vec()];
-            for arm in order {
-                let from = path.last()?;
-                let to: Vec<f64> = (0..from.len()).map(|i| if self.arm_of[i] == arm { goal[i] } else { from[i] }).collect();
-                if !self.edge_is_free(from, &to) {
-                    return None;
-                }
-                path.push(to);
-            }
-            Some(path)
+        // Arms that only get in each other's way are soonest timed; arms that must change places soonest found in all
+        // joints at once. What neither finds quickly gets more of both.
+        let samples = self.settings.max_iterations;
+        [(3, samples / 20), (30, samples - samples / 20)].into_iter().find_map(|(attempts, samples)| {
+            let timed = self.coordinated(start, goal, attempts, stream);
+            timed.or_else(|| self.grow_trees(start, goal, samples, stream))
         })
     }
 
-    fn grow_trees(&mut self, start: &[f64], goal: &[f64], stream: &mut Stream) -> Option<Vec<Vec<f64>>> {
+    /// The joints of each arm.
+    pub(crate) fn arms(&self) -> Vec<Range<usize>> {
+        self.arm_of
+            .chunk_by(|a, b| a == b)
+            .scan(0, |first, own| {
+                let joints = *first..*first + own.len();
+                *first = joints.end;
+                Some(joints)
+            })
+            .collect()
+    }
+
+    /// A short way of one arm as if no other moved; both ends differ in its joints only.
+    pub(crate) fn alone(
+        &mut self,
+        joints: &Range<usize>,
+        start: &[f64],
+        goal: &[f64],
+        stream: &mut Stream,
+    ) -> Option<Vec<Vec<f64>>> {
+        const SHARE: usize = 4; // of the samples, so that the search in all joints has its own
+        let free = (0..self.free.len()).map(|i| joints.contains(&i)).collect();
+        let all = std::mem::replace(&mut self.free, free);
+        self.scope = Scope::Own(self.arm_of[joints.start]);
+        let mut path = if self.edge_is_free(start, goal) {
+            Some(vec![start.to_vec(), goal.to_vec()])
+        } else {
+            self.grow_trees(start, goal, self.settings.max_iterations / SHARE, stream)
+        };
+        if let Some(path) = &mut path {
+            self.shorten(path, stream);
+        }
+        (self.scope, self.free) = (Scope::All, all);
+        path
+    }
+
+    fn grow_trees(&mut self, start: &[f64], goal: &[f64], samples: usize, stream: &mut Stream) -> Option<Vec<Vec<f64>>> {
         let mut trees = [Tree::new(start), Tree::new(goal)];
         let mut side = 0;
-        while self.samples_left > 0 {
-            self.samples_left -= 1;
+        for _ in 0..samples {
             let limits = self.limits.iter().zip(&self.free).zip(start);
             let sample: Vec<f64> =
                 limits.map(|((&[low, high], &free), &at)| if free { stream.range(low, high) } else { at }).collect();
@@ -238,14 +283,12 @@ impl<'a> Planner<'a> {
         self.edge_is_free(from, &to).then(|| tree.push(&to, nearest))
     }
 
-    /// Whether the straight line is free at the present step, its start excepted; middles first, they fail soonest.
     fn edge_is_free(&mut self, from: &[f64], to: &[f64]) -> bool {
-        let count = (largest_turn(from, to) / self.step).ceil().max(1.0) as u32;
-        let bits = u32::BITS - count.leading_zeros();
-        (0..1_u32 << bits).map(|i| i.reverse_bits() >> (u32::BITS - bits)).filter(|i| (1..=count).contains(i)).all(|i| {
-            let q = if i == count { to.to_vec() } else { blend(from, to, f64::from(i) / f64::from(count)) };
-            self.checker.is_free(&q, self.settings.margin)
-        })
+        self.edge_is_free_in(self.scope, from, to)
+    }
+
+    pub(crate) fn edge_is_free_in(&mut self, scope: Scope, from: &[f64], to: &[f64]) -> bool {
+        self.checker.edge_is_free_in(scope, from, to, self.settings.margin)
     }
 
     fn is_free(&mut self, path: &[Vec<f64>]) -> bool {
@@ -254,11 +297,13 @@ impl<'a> Planner<'a> {
 
     /// Replaces random stretches by straight lines, of all arms or of one arm alone, where that is free and shorter.
     fn shorten(&mut self, path: &mut Vec<Vec<f64>>, stream: &mut Stream) {
-        let arms = self.world.arms.len();
+        let arms = if self.scope == Scope::All { self.world.arms.len() } else { 1 };
+        let mut failures = 0;
         for _ in 0..self.settings.shortcut_iterations {
-            if path.len() <= 2 {
-                return;
+            if path.len() <= 2 || failures > self.settings.shortcut_patience {
+                break;
             }
+            failures += 1;
             let total = length(path);
             let (a, b) = (stream.unit() * total, stream.unit() * total);
             let choice = if arms > 1 { stream.index(arms + 1) } else { 0 };
@@ -278,10 +323,11 @@ impl<'a> Planner<'a> {
             let mut candidate = path[..=first].to_vec();
             candidate.extend(stretch.iter().cloned());
             candidate.extend_from_slice(&path[last + 1..]);
-            let start_is_free = |this: &mut Self| this.checker.is_free(&stretch[0], this.settings.margin);
-            if length(&candidate) < total - 1e-9 && start_is_free(self) && self.is_free(&stretch) {
+            // the stretch begins on the path, which is clear
+            if length(&candidate) < total * (1.0 - 1e-3) && self.is_free(&stretch) {
                 candidate.dedup();
                 *path = candidate;
+                failures = 0;
             }
         }
         remove_collinear(path);
@@ -301,18 +347,4 @@ impl<'a> Planner<'a> {
             }
         }
     }
-}
-
-fn orders(items: &[usize]) -> Vec<Vec<usize>> {
-    if items.is_empty() {
-        return vec![Vec::new()];
-    }
-    let led_by = |i: usize| {
-        let rest: Vec<usize> = items.iter().copied().filter(|&item| item != items[i]).collect();
-        orders(&rest).into_iter().map(move |mut order| {
-            order.insert(0, items[i]);
-            order
-        })
-    };
-    (0..items.len()).flat_map(led_by).collect()
 }

@@ -46,6 +46,6 @@ pub struct TrialRecord {
     pub detail: String,
     /// Simulated physics steps taken.
     pub steps: u64,
-    /// The largest part position error (m) and angle error (rad), and joint error (rad or m) at the end.
-    pub final_errors: [f64; 3],
+    /// The largest errors at the end: of part positions (m), part angles (rad), joints that turn (rad) and that slide (m).
+    pub final_errors: [f64; 4],
 }

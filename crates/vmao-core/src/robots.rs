@@ -3,6 +3,7 @@
 //! The simulator's model, the planner's collision model and the kinematic chain are all made from this one description.
 
 mod build;
+mod collision_model;
 mod panda;
 mod sawyer;
 
@@ -93,6 +94,11 @@ impl Gripper {
     /// The widest thing that fits between the pads (m).
     pub fn max_opening(&self) -> f64 {
         self.closed_gap + 2.0 * self.travel
+    }
+
+    /// How far each finger slides from closed to bring the pads `opening` apart (m; cut to its travel).
+    pub fn finger_travel(&self, opening: f64) -> f64 {
+        ((opening - self.closed_gap) / 2.0).clamp(0.0, self.travel)
     }
 }
 

@@ -5,6 +5,8 @@
 //! because rates squared are linear between grid points the limits hold everywhere, not only at them. A moving average
 //! over [`SMOOTHING_WINDOW`] then makes the acceleration continuous: averages never exceed the limits either.
 
+use crate::robots::RobotModel;
+
 /// Width of the moving average (s): moves the path by at most a·w²/24, under 0.0014 rad for the fastest Panda joint.
 pub const SMOOTHING_WINDOW: f64 = 0.04;
 
@@ -15,6 +17,17 @@ pub struct MotionLimits {
     pub velocity: Vec<f64>,
     /// Highest acceleration (rad/s²).
     pub acceleration: Vec<f64>,
+}
+
+impl MotionLimits {
+    /// All that these arms can do, arm after arm.
+    pub fn of(robots: &[RobotModel]) -> Self {
+        let joints = || robots.iter().flat_map(|robot| &robot.joints);
+        Self {
+            velocity: joints().map(|joint| joint.max_velocity).collect(),
+            acceleration: joints().map(|joint| joint.max_acceleration).collect(),
+        }
+    }
 }
 
 /// Joint positions as a function of time, at rest at both ends, with continuous velocity and acceleration.

@@ -2,14 +2,17 @@
 //! exponentials from part 0. It shares no code and no formulation with the quaternion motions under test.
 #![expect(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
-use nalgebra::{Matrix3, Matrix4, Point3, Rotation3, Unit, UnitQuaternion, Vector3};
+use nalgebra::{Matrix3, Matrix4, Point3, Quaternion, Rotation3, Unit, UnitQuaternion, Vector3};
 use proptest::prelude::{ProptestConfig, Strategy, any, prop_oneof, proptest};
 use std::f64::consts::{PI, TAU};
 use vmao_core::{
     contact::PartId,
     geometry::{Pose, pose},
-    object::{ArticulatedObject, Joint, JointKind, ObjectGoal, ObjectState, Part},
-    object_centric::{ObjectTrajectory, WorldJoint, goal_part_poses, gripper_goal, joint_positions, part_poses, world_joints},
+    object::{ArticulatedObject, Joint, JointKind, ObjectGoal, ObjectState, Part, by_joint},
+    object_centric::{
+        ObjectTrajectory, WorldJoint, goal_part_poses, gripper_goal, joint_deltas, joint_errors, joint_positions, part_poses,
+        world_joints,
+    },
     object_graph::ObjectGraph,
     random::Stream,
 };
@@ -42,7 +45,8 @@ impl Mechanism {
                 Topology::Star => 0,
                 Topology::Random => stream.index(part),
             };
-            let kind = [JointKind::Revolute, JointKind::Revolute, JointKind::Prismatic, JointKind::Fixed][stream.index(4)];
+            let kinds = [JointKind::Revolute, JointKind::Revolute, JointKind::Ball, JointKind::Prismatic, JointKind::Fixed];
+            let kind = kinds[stream.index(kinds.len())];
             let (parent, child) = if stream.unit() < 0.5 { (before, part) } else { (part, before) };
             joints.push((kind, parent, child, random_vector(stream, 10.0), random_vector(stream, 1.0).normalize()));
         }
@@ -51,15 +55,38 @@ impl Mechanism {
         Self { parts_at_zero, joints: order.into_iter().map(|joint| joints[joint]).collect() }
     }
 
+    fn kinds(&self) -> impl Iterator<Item = JointKind> {
+        self.joints.iter().map(|joint| joint.0)
+    }
+
+    /// From one position of all joints to another: differences, and for balls the logarithm of a product of half angles.
+    fn deltas(&self, base: &Matrix4<f64>, from: &[f64], to: &[f64]) -> Vec<f64> {
+        let (before, mut deltas) = (self.motions(base, from), Vec::new());
+        let both = by_joint(self.kinds(), from).into_iter().zip(by_joint(self.kinds(), to));
+        for (&(kind, parent, ..), (from, to)) in self.joints.iter().zip(both) {
+            if kind == JointKind::Ball {
+                let world_from_parent = before[parent].fixed_view::<3, 3>(0, 0).into_owned();
+                let change = half_turn(to) * half_turn(from).conjugate();
+                let angle = 2.0 * change.imag().norm().atan2(change.w);
+                let axis = change.imag().try_normalize(0.0).unwrap_or_default();
+                deltas.extend((world_from_parent * axis * angle).iter());
+            } else {
+                deltas.push(to[0] - from[0]);
+            }
+        }
+        deltas
+    }
+
     /// The motion of every part away from its place at zero, with part 0 moved by `base`.
     fn motions(&self, base: &Matrix4<f64>, positions: &[f64]) -> Vec<Matrix4<f64>> {
         let mut motions: Vec<Option<Matrix4<f64>>> = vec![None; self.parts_at_zero.len()];
         motions[0] = Some(*base);
         while motions.iter().any(Option::is_none) {
-            for (&(kind, parent, child, anchor, axis), &position) in self.joints.iter().zip(positions) {
+            for (&(kind, parent, child, anchor, axis), position) in self.joints.iter().zip(by_joint(self.kinds(), positions)) {
+                let motion = exponential(kind, &anchor, &axis, position);
                 match (motions[parent], motions[child]) {
-                    (Some(known), None) => motions[child] = Some(known * exponential(kind, &anchor, &axis, position)),
-                    (None, Some(known)) => motions[parent] = Some(known * exponential(kind, &anchor, &axis, -position)),
+                    (Some(known), None) => motions[child] = Some(known * motion),
+                    (None, Some(known)) => motions[parent] = Some(known * motion.try_inverse().unwrap()),
                     _ => {}
                 }
             }
@@ -89,17 +116,31 @@ impl Mechanism {
     }
 }
 
-fn exponential(kind: JointKind, anchor: &Vector3<f64>, axis: &Vector3<f64>, position: f64) -> Matrix4<f64> {
+/// Cosine and sine of half the angle of a rotation vector, as a quaternion.
+fn half_turn(vector: &[f64]) -> Quaternion<f64> {
+    let vector = Vector3::from_column_slice(vector);
+    let half = vector.norm() / 2.0;
+    Quaternion::from_parts(half.cos(), vector.try_normalize(0.0).unwrap_or_default() * half.sin())
+}
+
+/// The rotation matrix of a rotation vector.
+fn rodrigues(vector: &Vector3<f64>) -> Matrix3<f64> {
+    let Some(axis) = vector.try_normalize(0.0) else { return Matrix3::identity() };
+    let (k, angle) = (axis.cross_matrix(), vector.norm());
+    Matrix3::identity() + k * angle.sin() + k * k * (1.0 - angle.cos())
+}
+
+fn exponential(kind: JointKind, anchor: &Vector3<f64>, axis: &Vector3<f64>, position: &[f64]) -> Matrix4<f64> {
     let mut matrix = Matrix4::identity();
-    match kind {
-        JointKind::Revolute => {
-            let k = axis.cross_matrix();
-            let rotation = Matrix3::identity() + k * position.sin() + k * k * (1.0 - position.cos());
-            matrix.fixed_view_mut::<3, 3>(0, 0).copy_from(&rotation);
-            matrix.fixed_view_mut::<3, 1>(0, 3).copy_from(&(anchor - rotation * anchor));
-        }
-        JointKind::Prismatic => matrix.fixed_view_mut::<3, 1>(0, 3).copy_from(&(axis * position)),
-        JointKind::Fixed => {}
+    let rotation = match kind {
+        JointKind::Revolute => rodrigues(&(axis * position[0])),
+        JointKind::Ball => rodrigues(&Vector3::from_column_slice(position)),
+        JointKind::Prismatic | JointKind::Fixed => Matrix3::identity(),
+    };
+    matrix.fixed_view_mut::<3, 3>(0, 0).copy_from(&rotation);
+    matrix.fixed_view_mut::<3, 1>(0, 3).copy_from(&(anchor - rotation * anchor));
+    if kind == JointKind::Prismatic {
+        matrix.fixed_view_mut::<3, 1>(0, 3).copy_from(&(axis * position[0]));
     }
     matrix
 }
@@ -117,9 +158,19 @@ fn from_matrix(matrix: &Matrix4<f64>) -> Pose {
     Pose::from_parts(matrix.fixed_view::<3, 1>(0, 3).into_owned().into(), UnitQuaternion::from_rotation_matrix(&rotation))
 }
 
-fn positions(stream: &mut Stream, count: usize) -> Vec<f64> {
+/// Positions of joints of these kinds, often at singular angles.
+fn positions(stream: &mut Stream, kinds: impl Iterator<Item = JointKind>) -> Vec<f64> {
     let singular = [0.0, PI, -PI, TAU, PI / 2.0, 1e-9, PI - 1e-9];
-    (0..count).map(|_| if stream.unit() < 0.4 { singular[stream.index(7)] } else { stream.range(-7.0, 7.0) }).collect()
+    let mut positions = Vec::new();
+    for kind in kinds {
+        let angle = if stream.unit() < 0.4 { singular[stream.index(7)] } else { stream.range(-7.0, 7.0) };
+        if kind == JointKind::Ball {
+            positions.extend((random_vector(stream, 1.0).normalize() * angle).iter());
+        } else {
+            positions.push(angle);
+        }
+    }
+    positions
 }
 
 #[track_caller]
@@ -147,11 +198,11 @@ proptest! {
         let mut stream = Stream::new(seed, &[]);
         let mechanism = Mechanism::random(&mut stream, count, topology);
         let (before, after) = (random_pose(&mut stream).to_homogeneous(), random_pose(&mut stream).to_homogeneous());
-        let (q0, q1) = (positions(&mut stream, count - 1), positions(&mut stream, count - 1));
+        let (q0, q1) = (positions(&mut stream, mechanism.kinds()), positions(&mut stream, mechanism.kinds()));
         let start: Vec<Pose> = mechanism.parts(&before, &q0).iter().map(from_matrix).collect();
         let expected = mechanism.parts(&after, &q1);
         let joints = mechanism.world_joints(&before, &q0);
-        let deltas: Vec<f64> = q0.iter().zip(&q1).map(|(a, b)| b - a).collect();
+        let deltas = mechanism.deltas(&before, &q0, &q1);
         for root in 0..count {
             let goal = from_matrix(&expected[root]);
             let goals = goal_part_poses(&mechanism.graph(), &joints, &start, &deltas, PartId(root as u16), &goal);
@@ -167,13 +218,14 @@ proptest! {
         let mechanism = Mechanism::random(&mut stream, count, topology);
         let (graph, root) = (mechanism.graph(), root % count);
         let before = random_pose(&mut stream).to_homogeneous();
-        let (q0, q1, q2) = (positions(&mut stream, count - 1), positions(&mut stream, count - 1), positions(&mut stream, count - 1));
-        let difference = |a: &[f64], b: &[f64]| -> Vec<f64> { a.iter().zip(b).map(|(a, b)| b - a).collect() };
+        let [q0, q1, q2] = [0; 3].map(|_| positions(&mut stream, mechanism.kinds()));
         let parts: Vec<Pose> = mechanism.parts(&before, &q0).iter().map(from_matrix).collect();
         let start_joints = mechanism.world_joints(&before, &q0);
         let (middle_root, end_root) = (random_pose(&mut stream), random_pose(&mut stream));
         let id = PartId(root as u16);
-        let middle = goal_part_poses(&graph, &start_joints, &parts, &difference(&q0, &q1), id, &middle_root);
+        let middle = goal_part_poses(&graph, &start_joints, &parts, &mechanism.deltas(&before, &q0, &q1), id, &middle_root);
+        // Where part 0's frame at zero went.
+        let base = middle[0].to_homogeneous() * mechanism.parts_at_zero[0].try_inverse().unwrap();
 
         let grippers: Vec<Pose> = parts.iter().map(|part| part * random_pose(&mut stream)).collect();
         for part in 0..count {
@@ -188,10 +240,10 @@ proptest! {
             let motion = middle[parent] * parts[parent].inverse();
             WorldJoint { anchor: motion * joint.anchor, axis: motion.rotation * joint.axis, ..*joint }
         }).collect();
-        let end = goal_part_poses(&graph, &carried, &middle, &difference(&q1, &q2), id, &end_root);
-        let at_once = goal_part_poses(&graph, &start_joints, &parts, &difference(&q0, &q2), id, &end_root);
+        let end = goal_part_poses(&graph, &carried, &middle, &mechanism.deltas(&base, &q1, &q2), id, &end_root);
+        let at_once = goal_part_poses(&graph, &start_joints, &parts, &mechanism.deltas(&before, &q0, &q2), id, &end_root);
         check(&end, &at_once.iter().map(Pose::to_homogeneous).collect::<Vec<_>>());
-        let back = goal_part_poses(&graph, &carried, &middle, &difference(&q1, &q0), id, &parts[root]);
+        let back = goal_part_poses(&graph, &carried, &middle, &mechanism.deltas(&base, &q1, &q0), id, &parts[root]);
         check(&back, &parts.iter().map(Pose::to_homogeneous).collect::<Vec<_>>());
     }
 
@@ -201,8 +253,16 @@ proptest! {
         let object = random_object(&mut stream, count);
         let (graph, root) = (ObjectGraph::of(&object).unwrap(), PartId((root % count) as u16));
         let draw = |stream: &mut Stream| -> Vec<f64> {
-            let draw_joint = |joint: &Joint| if joint.kind == JointKind::Fixed { 0.0 } else { stream.range(-3.0, 3.0) };
-            object.joints.iter().map(draw_joint).collect()
+            // Within half a turn, beyond which no measurement can tell angles apart.
+            let draw_joint = |joint: &Joint| match joint.kind {
+                JointKind::Fixed => vec![0.0],
+                JointKind::Ball => {
+                    let angle = [0.0, 1e-9, PI - 1e-6, stream.range(0.0, 3.1)][stream.index(4)];
+                    (random_vector(stream, 1.0).normalize() * angle).iter().copied().collect()
+                }
+                JointKind::Revolute | JointKind::Prismatic => vec![stream.range(-3.0, 3.0)],
+            };
+            object.joints.iter().flat_map(draw_joint).collect()
         };
         let (q0, q1) = (draw(&mut stream), draw(&mut stream));
         let base = random_pose(&mut stream);
@@ -212,6 +272,11 @@ proptest! {
         for (measured, joint) in joint_positions(&object, &start).iter().zip(&q0) {
             assert!((measured - joint).abs() < TOLERANCE, "{measured} {joint}");
         }
+        let deltas = joint_deltas(&object, &start, &q0, &q1);
+        let goals = goal_part_poses(&graph, &world_joints(&object, &start), &start, &deltas, root, &start[usize::from(root.0)]);
+        check(&goals, &part_poses(&object, &graph, root, &start[usize::from(root.0)], &q1).iter().map(Pose::to_homogeneous).collect::<Vec<_>>());
+        let moved = joint_errors(&object, &q1, &joint_positions(&object, &goals));
+        assert!(moved.iter().all(|&error| error < 1e-7), "{moved:?}");
 
         let goal_root = random_pose(&mut stream);
         let state = ObjectState { world_from_parts: start.clone(), joint_positions: q0.clone() };
@@ -246,24 +311,47 @@ fn random_object(stream: &mut Stream, count: usize) -> ArticulatedObject {
     ArticulatedObject { name: "random".into(), parts: (0..count).map(part).collect(), joints }
 }
 
+/// Parts at x = 0 and x = 2 (m), joined half way between them, about z if the joint has an axis.
+fn two_parts(kind: JointKind) -> (WorldJoint, ObjectGraph, [Pose; 2]) {
+    let (parent, child) = (PartId(0), PartId(1));
+    let joint = WorldJoint { kind, parent, child, anchor: Point3::new(1.0, 0.0, 0.0), axis: Vector3::z_axis() };
+    let at = |x| pose([x, 0.0, 0.0], [1.0, 0.0, 0.0, 0.0]);
+    (joint, ObjectGraph::new(2, &[(parent, child)]).unwrap(), [at(0.0), at(2.0)])
+}
+
 #[test]
 fn a_hinge_opened_by_a_right_angle_has_its_textbook_poses() {
     // b is hinged to a at (1, 0, 0) about z; a quarter turn takes b's origin from (2, 0, 0) to (1, 1, 0).
-    let joint = WorldJoint {
-        kind: JointKind::Revolute,
-        parent: PartId(0),
-        child: PartId(1),
-        anchor: Point3::new(1.0, 0.0, 0.0),
-        axis: Vector3::z_axis(),
-    };
-    let graph = ObjectGraph::new(2, &[(PartId(0), PartId(1))]).unwrap();
-    let start = [pose([0.0; 3], [1.0, 0.0, 0.0, 0.0]), pose([2.0, 0.0, 0.0], [1.0, 0.0, 0.0, 0.0])];
+    let (joint, graph, start) = two_parts(JointKind::Revolute);
     let goals = goal_part_poses(&graph, &[joint], &start, &[PI / 2.0], PartId(0), &start[0]);
     assert!((goals[1].translation.vector - Vector3::new(1.0, 1.0, 0.0)).norm() < 1e-15);
     // With b the root and standing still, a turns the other way: its origin goes to (1, 1, 0) as well.
     let goals = goal_part_poses(&graph, &[joint], &start, &[PI / 2.0], PartId(1), &start[1]);
     assert!((goals[0].translation.vector - Vector3::new(1.0, 1.0, 0.0)).norm() < 1e-15);
     assert!((goals[0].rotation.angle() - PI / 2.0).abs() < 1e-15 && goals[0].rotation.axis().unwrap().z < 0.0);
+}
+
+#[test]
+fn a_ball_joint_turned_about_its_anchor_has_its_textbook_poses() {
+    let (joint, graph, start) = two_parts(JointKind::Ball);
+    // A quarter turn about -y takes the child's arm from +x to +z; the axis of the joint plays no part.
+    let quarter = [0.0, -PI / 2.0, 0.0];
+    let goals = goal_part_poses(&graph, &[joint], &start, &quarter, PartId(0), &start[0]);
+    assert!((goals[1].translation.vector - Vector3::new(1.0, 0.0, 1.0)).norm() < 1e-15);
+    // With the child as the standing root, the parent's arm goes from -x to ... the inverse turn of it: +z, from below.
+    let goals = goal_part_poses(&graph, &[joint], &start, &quarter, PartId(1), &start[1]);
+    assert!((goals[0].translation.vector - Vector3::new(1.0, 0.0, 1.0)).norm() < 1e-15, "{}", goals[0]);
+    // Half a turn either way is the same turn, and no turn is none.
+    for (vector, expected) in [([PI, 0.0, 0.0], 2.0), ([-PI, 0.0, 0.0], 2.0), ([0.0; 3], 2.0), ([0.0, PI, 0.0], 0.0)] {
+        let goals = goal_part_poses(&graph, &[joint], &start, &vector, PartId(0), &start[0]);
+        assert!((goals[1].translation.vector - Vector3::new(expected, 0.0, 0.0)).norm() < 1e-15);
+    }
+}
+
+#[test]
+#[should_panic(expected = "coordinates too many")]
+fn a_position_with_too_many_coordinates_is_refused() {
+    by_joint([JointKind::Ball, JointKind::Fixed].into_iter(), &[0.0; 5]);
 }
 
 #[test]

@@ -69,7 +69,7 @@ pub(crate) struct Attempt<'a> {
     pub(crate) goal_parts: Vec<Pose>,
     pub(crate) held: Vec<(ArmId, PartId)>,
     grasps: Vec<GraspRecord>,
-    pub(crate) errors: [f64; 3],
+    pub(crate) errors: [f64; 4],
     /// Worst ratio of error to threshold while the goal was to be held.
     pub(crate) factor: f64,
     /// How the motions of the object went with all parts held.
@@ -144,13 +144,11 @@ impl<'a> Attempt<'a> {
     pub(crate) fn step_goal(&self, count: usize) -> ObjectGoal {
         let now = self.simulation.object_state();
         let held = |part: PartId| usize::from(part.0) < count;
-        let joints = self.scene.object.joints.iter().enumerate();
-        let joint_positions = joints
-            .map(|(index, joint)| {
-                let positions =
-                    if held(joint.parent) && held(joint.child) { &self.goal.joint_positions } else { &now.joint_positions };
-                positions[index]
-            })
+        let object = &self.scene.object;
+        let both = object.positions_by_joint(&self.goal.joint_positions).zip(object.positions_by_joint(&now.joint_positions));
+        let joint_positions = both
+            .flat_map(|((joint, goal), (_, now))| if held(joint.parent) && held(joint.child) { goal } else { now })
+            .copied()
             .collect();
         let root = if held(self.goal.root) { self.goal.root } else { PartId(0) };
         ObjectGoal { root, world_from_root: self.goal_parts[usize::from(root.0)], joint_positions }
@@ -353,8 +351,14 @@ impl<'a> Attempt<'a> {
         if self.factor <= 1.0 {
             return Ok(());
         }
-        let [position, rotation, joint] = self.errors;
-        let why = format!("{:.1} mm, {:.1}°, joint {:.1}° off", position * 1e3, rotation.to_degrees(), joint.to_degrees());
+        let [position, rotation, turn, slide] = self.errors;
+        let why = format!(
+            "{:.1} mm, {:.1}°, joints {:.1}° and {:.1} mm off",
+            position * 1e3,
+            rotation.to_degrees(),
+            turn.to_degrees(),
+            slide * 1e3
+        );
         Err(Failure::new(FailureStage::Threshold, why))
     }
 

@@ -70,7 +70,7 @@ impl Attempt<'_> {
             }
             if time >= hold_from {
                 errors = goal_errors(scene, goal_parts, wanted, &simulation.object_state());
-                worst = worst.max(threshold_factor(scene, thresholds, goal_parts, wanted, &simulation.object_state()));
+                worst = worst.max(threshold_factor(thresholds, &errors));
             }
         };
         let outcome = time(Stage::Control, || self.simulation.carry(&trajectory, &held, &postures, extra, motion, at_tick));

@@ -2,7 +2,7 @@
 
 use mujoco_rs::wrappers::mj_data::MjData;
 use mujoco_rs::wrappers::mj_model::MjModel;
-use nalgebra::{Matrix3, Vector3};
+use nalgebra::{Matrix3, UnitQuaternion, Vector3};
 use std::sync::Arc;
 use vmao_core::geometry::{Pose, pose, position_quaternion};
 use vmao_core::osc::{Jacobian, JointVector, MassMatrix};
@@ -21,6 +21,12 @@ pub(crate) fn body_pose(data: &Data, body: usize) -> Pose {
 pub(crate) fn free_joint_position(pose: &Pose) -> [f64; 7] {
     let ([x, y, z], [qw, qx, qy, qz]) = position_quaternion(pose);
     [x, y, z, qw, qx, qy, qz]
+}
+
+/// Our rotation as the four numbers of a MuJoCo ball joint: the quaternion w, x, y, z.
+pub(crate) fn ball_joint_position(rotation: &UnitQuaternion<f64>) -> [f64; 4] {
+    let q = rotation.quaternion();
+    [q.w, q.i, q.j, q.k]
 }
 
 /// Jacobian at a world point of a chain of hinges with these MuJoCo joint ids: linear rows, then angular.

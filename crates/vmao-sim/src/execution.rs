@@ -6,7 +6,7 @@ use crate::simulation::{Grip, Simulation};
 use nalgebra::{Vector3, Vector6};
 use serde::{Deserialize, Serialize};
 use vmao_core::contact::{ArmId, PartId};
-use vmao_core::geometry::{Pose, rotation_log};
+use vmao_core::geometry::{Pose, rotation_distance, rotation_log};
 use vmao_core::object_centric::{ObjectTrajectory, gripper_goal};
 use vmao_core::osc::JointVector;
 use vmao_core::outcome::FailureStage;
@@ -38,6 +38,9 @@ pub struct MotionConfig {
 const WATCH_EVERY: u64 = 10;
 /// A held part may be without pad contact for this many examinations before it counts as lost.
 const LOST_AFTER: u32 = 5;
+
+/// A part that has moved in the pads by this much (m, rad) since the motion began is not where any plan has it.
+const SLIPPED: [f64; 2] = [0.05, 1.5];
 
 /// Ticks over which the pads' forces are averaged to tell whether a gripper holds its part.
 const HOLD_TICKS: u32 = 25;
@@ -131,6 +134,7 @@ impl Simulation<'_> {
         let ticks = ((trajectory.duration() + extra) / self.scene.timestep).ceil() as u64;
         let mut wanted = trajectory.part_poses_at(0.0);
         let mut lost = vec![0; held.len()];
+        let part_from_tools = self.part_from_tools(held);
         for tick in 1..=ticks {
             let time = tick as f64 * self.scene.timestep;
             let next = trajectory.part_poses_at(time);
@@ -149,6 +153,7 @@ impl Simulation<'_> {
             if self.steps.is_multiple_of(WATCH_EVERY) {
                 self.watch_collisions(held, motion)?;
                 self.watch_hold(held, &mut lost)?;
+                self.watch_slip(held, &part_from_tools)?;
             }
         }
         Ok(())
@@ -160,6 +165,24 @@ impl Simulation<'_> {
                 && force > motion.collision_force
             {
                 return Err(Failure::new(FailureStage::Collision, format!("arm {} pressed on {what} with {force:.0} N", arm.0)));
+            }
+        }
+        Ok(())
+    }
+
+    fn part_from_tools(&self, held: &[(ArmId, PartId)]) -> Vec<Pose> {
+        let parts = self.object_state().world_from_parts;
+        held.iter().map(|(arm, part)| parts[usize::from(part.0)].inverse() * self.tool_pose(usize::from(arm.0))).collect()
+    }
+
+    fn watch_slip(&self, held: &[(ArmId, PartId)], before: &[Pose]) -> Result<(), Failure> {
+        for ((now, before), (arm, part)) in self.part_from_tools(held).iter().zip(before).zip(held) {
+            let shift = (now.translation.vector - before.translation.vector).norm();
+            let turn = rotation_distance(&now.rotation, &before.rotation);
+            if shift > SLIPPED[0] || turn > SLIPPED[1] {
+                let why =
+                    format!("part {} slipped in arm {} by {:.0} mm and {:.0}°", part.0, arm.0, shift * 1e3, turn.to_degrees());
+                return Err(Failure::new(FailureStage::Slip, why));
             }
         }
         Ok(())

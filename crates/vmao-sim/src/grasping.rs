@@ -2,7 +2,6 @@
 
 use crate::cameras::TABLE_PLANE_HEIGHT;
 use crate::failure::Failure;
-use crate::planning_world::lowest_gripper_point;
 use crate::simulation::Simulation;
 use nalgebra::{Point3, Vector3};
 use serde::{Deserialize, Serialize};
@@ -123,7 +122,7 @@ pub(crate) fn reachable_grasps(
     let mut above_table = 0;
     let mut found = Vec::new();
     for (index, pose) in poses.into_iter().enumerate() {
-        let lowest = lowest_gripper_point(robot, &pose.world_from_tool, opening);
+        let lowest = robot.lowest_gripper_point(&pose.world_from_tool, opening);
         let missing = config.table_clearance - lowest;
         let rise = -(pose.world_from_tool.rotation * Vector3::z()).z;
         // Raised back along the approach until the fingertips clear the table.

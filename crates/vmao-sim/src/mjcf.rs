@@ -4,6 +4,7 @@ use crate::convention::{inertial_element, pose_attributes, shape_attributes};
 use crate::link_meshes::{self, Dress, LinkMesh};
 use crate::scene::SceneConfig;
 use std::fmt::Write;
+use vmao_core::collision::Obstacle;
 use vmao_core::contact::PartId;
 use vmao_core::geometry::Pose;
 use vmao_core::object::{ArticulatedObject, Joint, JointKind};
@@ -48,6 +49,23 @@ pub(crate) fn scene(
     exclusions(&mut xml, robots);
     couplings(&mut xml, robots.len());
     actuators(&mut xml, robots);
+    line(&mut xml, "</mujoco>");
+    xml
+}
+
+/// Arms among obstacles that do not move, and nothing else.
+pub(crate) fn arms_among(config: &SceneConfig, robots: &[RobotModel], bases: &[Pose], obstacles: &[Obstacle]) -> String {
+    let mut xml = String::new();
+    header(&mut xml, config);
+    line(&mut xml, "<worldbody>");
+    for (index, obstacle) in obstacles.iter().enumerate() {
+        solid_geom(&mut xml, &format!("obstacle{index}"), &obstacle.solid, "");
+    }
+    for (arm, (robot, base)) in robots.iter().zip(bases).enumerate() {
+        arm_body(&mut xml, config, arm, robot, base, &Dress::of(robot.name, &[]));
+    }
+    line(&mut xml, "</worldbody>");
+    exclusions(&mut xml, robots);
     line(&mut xml, "</mujoco>");
     xml
 }
@@ -169,6 +187,7 @@ fn joint_element(xml: &mut String, joint: &Joint, from: PartId) {
     let kind = match joint.kind {
         JointKind::Revolute => "hinge",
         JointKind::Prismatic => "slide",
+        JointKind::Ball => "ball",
         JointKind::Fixed => return,
     };
     let limits = joint.limits.map_or_else(String::new, |[low, high]| format!(r#" range="{low} {high}""#));
@@ -193,20 +212,15 @@ fn joint_element(xml: &mut String, joint: &Joint, from: PartId) {
 fn exclusions(xml: &mut String, robots: &[RobotModel]) {
     line(xml, "<contact>");
     for (arm, robot) in robots.iter().enumerate() {
-        let mut names = vec![robot.base.name];
-        names.extend(robot.joints.iter().map(|joint| joint.link.name));
-        names.push(robot.gripper.hand.name);
-        let fingers = robot.gripper.fingers.each_ref().map(|finger| finger.link.name);
-        let mut pairs = Vec::new();
-        for first in 0..names.len() {
-            for second in first + 1..(first + 3).min(names.len()) {
-                pairs.push((names[first], names[second]));
-            }
+        let mut bodies = vec![vec![robot.base.name]];
+        bodies.extend(robot.joints.iter().map(|joint| vec![joint.link.name]));
+        bodies.push(vec![robot.gripper.hand.name]);
+        let [left, right] = robot.gripper.fingers.each_ref().map(|finger| finger.link.name);
+        bodies.push(vec![left, right]);
+        let mut pairs = vec![(left, right)];
+        for (first, second) in robot.neighbours() {
+            pairs.extend(bodies[first].iter().flat_map(|first| bodies[second].iter().map(move |second| (*first, *second))));
         }
-        for finger in fingers {
-            pairs.extend(names[names.len() - 4..].iter().map(|name| (*name, finger)));
-        }
-        pairs.push((fingers[0], fingers[1]));
         for (first, second) in pairs {
             line(xml, &format!(r#"<exclude body1="{}" body2="{}"/>"#, arm_name(arm, first), arm_name(arm, second)));
         }

@@ -1,5 +1,6 @@
 //! A scene: arms around a table, one object, the compiled simulator model and who owns which of its geoms.
 
+use crate::convention::ball_joint_position;
 use crate::error::Error;
 use crate::layout::{BasePlacement, Layout, Spacing, base_poses};
 use crate::mjcf;
@@ -10,8 +11,8 @@ use serde::{Deserialize, Serialize};
 use std::sync::Arc;
 use vmao_core::catalogue::CatalogueItem;
 use vmao_core::contact::{ArmId, ContactTuple, PartId};
-use vmao_core::geometry::Pose;
-use vmao_core::object::ArticulatedObject;
+use vmao_core::geometry::{Pose, rotation_exp};
+use vmao_core::object::{ArticulatedObject, Joint, JointKind};
 use vmao_core::object_graph::ObjectGraph;
 use vmao_core::osc::{JOINTS, JointLimits, JointVector};
 use vmao_core::robots::RobotModel;
@@ -131,7 +132,6 @@ impl Scene {
     }
 
     /// The object alone on the table: for what needs no arms.
-    #[cfg(test)]
     pub(crate) fn without_arms(config: &SceneConfig, item: CatalogueItem) -> Result<Self, Error> {
         Self::compile(config, Vec::new(), Vec::new(), item)
     }
@@ -159,7 +159,7 @@ impl Scene {
             .joints
             .iter()
             .map(|joint| match joint.kind {
-                vmao_core::object::JointKind::Fixed => Ok(None),
+                JointKind::Fixed => Ok(None),
                 _ => addresses(&model, &mjcf::part_name(&joint.name)).map(Some),
             })
             .collect::<Result<Vec<_>, _>>()?;
@@ -186,6 +186,24 @@ impl Scene {
     }
 }
 
+impl Scene {
+    /// Writes the object's joint positions (rad or m, flat) into the simulator's coordinates.
+    pub(crate) fn set_object_joints(&self, qpos: &mut [f64], joint_positions: &[f64]) {
+        let positions: Vec<(&Joint, &[f64])> = self.object.positions_by_joint(joint_positions).collect();
+        // The simulator's tree is rooted at part 0, whatever root control uses.
+        for step in self.graph.outward(PartId(0)) {
+            let (joint, position) = positions[step.joint];
+            let Some((address, _)) = self.joint_addresses[step.joint] else { continue };
+            if joint.kind == JointKind::Ball {
+                let turn = rotation_exp(&(Vector3::from_column_slice(position) * step.direction.sign()));
+                qpos[address..address + 4].copy_from_slice(&ball_joint_position(&turn));
+            } else {
+                qpos[address] = position[0];
+            }
+        }
+    }
+}
+
 /// The means of all demonstrated points of finger 1 and of finger 2 on each part; the part's origin where there is none.
 fn hold_fingers(item: &CatalogueItem) -> Vec<[Point3<f64>; 2]> {
     let mean = |part: usize, finger: usize| {
@@ -200,7 +218,7 @@ fn id(model: &MjModel, kind: MjtObjBase, name: &str) -> Result<usize, Error> {
     model.name_to_id(kind, name).ok_or_else(|| Error::Model { cause: format!("the compiled model has no `{name}`") })
 }
 
-fn addresses(model: &MjModel, joint: &str) -> Result<(usize, usize), Error> {
+pub(crate) fn addresses(model: &MjModel, joint: &str) -> Result<(usize, usize), Error> {
     let joint = id(model, MjtObjBase::mjOBJ_JOINT, joint)?;
     Ok((model.jnt_qposadr()[joint] as usize, model.jnt_dofadr()[joint] as usize))
 }

@@ -9,6 +9,7 @@ use vmao_core::contact::{ArmId, PartId};
 use vmao_core::geometry::Pose;
 use vmao_core::kinematics::SerialChain;
 use vmao_core::object::{JointKind, ObjectState};
+use vmao_core::object_centric::joint_positions;
 use vmao_core::osc::{ArmState, GripperGoal, JointVector, OscGains, torques};
 
 /// What a gripper's drive is told.
@@ -55,11 +56,7 @@ impl<'s> Simulation<'s> {
         let nv = data.qvel().len();
         let qpos = data.qpos_mut();
         qpos[scene.object_qpos..scene.object_qpos + 7].copy_from_slice(&free_joint_position(world_from_root));
-        for (address, &position) in scene.joint_addresses.iter().zip(joint_positions) {
-            if let Some((qpos_address, _)) = address {
-                qpos[*qpos_address] = position;
-            }
-        }
+        scene.set_object_joints(qpos, joint_positions);
         for (arm, robot) in scene.arms.iter().zip(&scene.robots) {
             qpos[arm.qpos..arm.qpos + 7].copy_from_slice(&robot.home);
             qpos[arm.finger_qpos] = robot.gripper.travel;
@@ -114,7 +111,7 @@ impl<'s> Simulation<'s> {
         let limit = 2.0 * gripper.max_force;
         match self.grips[arm] {
             Grip::Open(opening) => {
-                let target = ((opening - gripper.closed_gap) / 2.0).clamp(0.0, gripper.travel);
+                let target = gripper.finger_travel(opening);
                 (OPENING_STIFFNESS * (target - self.data.qpos()[self.scene.arms[arm].finger_qpos])).clamp(-limit, limit)
             }
             Grip::Close(force) => -(2.0 * force).min(limit),
@@ -153,19 +150,24 @@ impl<'s> Simulation<'s> {
 
     /// Where the object is.
     pub(crate) fn object_state(&self) -> ObjectState {
-        let joint = |(address, joint): (&Option<(usize, usize)>, &vmao_core::object::Joint)| match (address, joint.kind) {
-            (Some((qpos, _)), JointKind::Revolute | JointKind::Prismatic) => self.data.qpos()[*qpos],
-            _ => 0.0,
-        };
-        ObjectState {
-            world_from_parts: self.scene.part_bodies.iter().map(|&body| body_pose(&self.data, body)).collect(),
-            joint_positions: self.scene.joint_addresses.iter().zip(&self.scene.object.joints).map(joint).collect(),
+        let object = &self.scene.object;
+        let world_from_parts: Vec<Pose> = self.scene.part_bodies.iter().map(|&body| body_pose(&self.data, body)).collect();
+        let mut joint_positions = joint_positions(object, &world_from_parts);
+        let mut coordinate = 0;
+        for (address, joint) in self.scene.joint_addresses.iter().zip(&object.joints) {
+            // The simulator counts the turns of a hinge; poses alone cannot tell them apart.
+            if let (Some((qpos, _)), JointKind::Revolute | JointKind::Prismatic) = (address, joint.kind) {
+                joint_positions[coordinate] = self.data.qpos()[*qpos];
+            }
+            coordinate += joint.kind.coordinates();
         }
+        ObjectState { world_from_parts, joint_positions }
     }
 
     /// The fastest motion of the object: over its free body (m/s and rad/s mixed) and its joints.
     pub(crate) fn object_speed(&self) -> f64 {
-        let joints = self.scene.joint_addresses.iter().flatten().map(|(_, dof)| *dof);
+        let joints = self.scene.joint_addresses.iter().zip(&self.scene.object.joints);
+        let joints = joints.filter_map(|(address, joint)| address.map(|(_, dof)| dof..dof + joint.kind.coordinates())).flatten();
         (self.scene.object_dof..self.scene.object_dof + 6)
             .chain(joints)
             .map(|dof| self.data.qvel()[dof].abs())

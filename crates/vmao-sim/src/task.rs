@@ -5,8 +5,8 @@ use nalgebra::{Unit, UnitQuaternion, Vector3};
 use serde::{Deserialize, Serialize};
 use vmao_core::contact::PartId;
 use vmao_core::geometry::{Pose, rotation_distance};
-use vmao_core::object::{JointKind, ObjectGoal, ObjectState};
-use vmao_core::object_centric::{joint_positions, part_poses};
+use vmao_core::object::{Joint, JointKind, ObjectGoal, ObjectState};
+use vmao_core::object_centric::{ball_change, joint_errors, joint_positions, part_poses};
 use vmao_core::random::Stream;
 
 /// Where objects start: on the table, at any heading.
@@ -31,7 +31,7 @@ pub struct GoalConfig {
     pub tilt_deg: f64,
     /// Every joint changes by at least this share of its range ...
     pub joint_change_share: f64,
-    /// ... and a revolute joint by at least this much (degrees).
+    /// ... and a joint that turns by at least this much (degrees).
     pub joint_change_deg: f64,
 }
 
@@ -43,7 +43,7 @@ pub struct Thresholds {
     pub position: f64,
     /// Of every part's orientation (degrees).
     pub rotation_deg: f64,
-    /// Of every revolute joint (degrees).
+    /// Of every joint that turns (degrees).
     pub joint_deg: f64,
     /// Of every prismatic joint (m).
     pub joint_m: f64,
@@ -57,9 +57,13 @@ pub(crate) fn sample_start(scene: &Scene, config: &StartConfig, stream: &mut Str
         .object
         .joints
         .iter()
-        .map(|joint| {
-            let [low, high] = joint.limits.unwrap_or([-1.0, 1.0]);
-            if joint.kind == JointKind::Fixed { 0.0 } else { stream.range(low, high) }
+        .flat_map(|joint| match (joint.kind, joint.limits) {
+            (JointKind::Fixed, _) => vec![0.0],
+            (JointKind::Ball, limits) => ball_position(largest_turn(limits), stream),
+            (_, limits) => {
+                let [low, high] = limits.unwrap_or([-1.0, 1.0]);
+                vec![stream.range(low, high)]
+            }
         })
         .collect();
     let x = stream.range(-config.half_width, config.half_width);
@@ -72,7 +76,7 @@ pub(crate) fn sample_start(scene: &Scene, config: &StartConfig, stream: &mut Str
 }
 
 /// Height of the lowest point of the object.
-fn lowest_point(scene: &Scene, world_from_root: &Pose, joints: &[f64]) -> f64 {
+pub(crate) fn lowest_point(scene: &Scene, world_from_root: &Pose, joints: &[f64]) -> f64 {
     let parts = part_poses(&scene.object, &scene.graph, PartId(0), world_from_root, joints);
     let placed = scene.object.parts.iter().zip(&parts);
     let heights = placed.flat_map(|(part, pose)| part.solids.iter().map(move |solid| solid.lowest_point(pose)));
@@ -98,27 +102,56 @@ pub(crate) fn sample_goal(
     let tilt_axis = Unit::new_normalize(Vector3::new(tilt_heading.cos(), tilt_heading.sin(), 0.0));
     let turn = UnitQuaternion::from_axis_angle(&tilt_axis, tilt) * UnitQuaternion::from_axis_angle(&Vector3::z_axis(), yaw);
     let position = world_from_root.translation.vector + Vector3::new(distance * heading.cos(), distance * heading.sin(), lift);
-    let joint_positions = scene
-        .object
-        .joints
-        .iter()
-        .zip(&start.joint_positions)
-        .map(|(joint, &now)| {
-            let [low, high] = joint.limits.unwrap_or([now - 1.0, now + 1.0]);
-            match joint.kind {
-                JointKind::Fixed => 0.0,
-                JointKind::Revolute => changed(
-                    now,
-                    low,
-                    high,
-                    (config.joint_change_share * (high - low)).max(config.joint_change_deg.to_radians()),
-                    stream,
-                ),
-                JointKind::Prismatic => changed(now, low, high, config.joint_change_share * (high - low), stream),
-            }
-        })
-        .collect();
+    let joints = scene.object.positions_by_joint(&start.joint_positions);
+    let joint_positions = joints.flat_map(|(joint, now)| changed_joint(joint, config, now, stream)).collect();
     ObjectGoal { root, world_from_root: Pose::from_parts(position.into(), turn * world_from_root.rotation), joint_positions }
+}
+
+/// A position of the joint within its limits that differs from `now` by at least the configured change, where it can.
+fn changed_joint(joint: &Joint, config: &GoalConfig, now: &[f64], stream: &mut Stream) -> Vec<f64> {
+    let least_turn = config.joint_change_deg.to_radians();
+    match joint.kind {
+        JointKind::Fixed => vec![0.0],
+        JointKind::Ball => {
+            let largest = largest_turn(joint.limits);
+            changed_ball(now, largest, (config.joint_change_share * largest).max(least_turn), stream)
+        }
+        JointKind::Revolute | JointKind::Prismatic => {
+            let now = now[0];
+            let [low, high] = joint.limits.unwrap_or([now - 1.0, now + 1.0]);
+            let least = if joint.kind == JointKind::Revolute { least_turn } else { 0.0 };
+            vec![changed(now, low, high, (config.joint_change_share * (high - low)).max(least), stream)]
+        }
+    }
+}
+
+/// The largest angle that a ball joint with these limits may be turned by (rad).
+fn largest_turn(limits: Option<[f64; 2]>) -> f64 {
+    limits.map_or(1.0, |[_, largest]| largest)
+}
+
+/// A rotation vector of any direction, its angle uniform up to `largest` (rad).
+fn ball_position(largest: f64, stream: &mut Stream) -> Vec<f64> {
+    let direction = Vector3::from_fn(|_, _| stream.normal()).try_normalize(1e-9).unwrap_or_else(Vector3::x);
+    (direction * stream.range(0.0, largest)).iter().copied().collect()
+}
+
+/// A ball's position at least `change` (rad) away from `now`; the furthest of all tries if none is.
+fn changed_ball(now: &[f64], largest: f64, change: f64, stream: &mut Stream) -> Vec<f64> {
+    // Half of all directions point away from `now`: so many tries fail only where the limits leave no room.
+    const TRIES: usize = 64;
+    let mut furthest = (0.0, now.to_vec());
+    for _ in 0..TRIES {
+        let position = ball_position(largest, stream);
+        let distance = ball_change(now, &position).norm();
+        if distance > furthest.0 {
+            furthest = (distance, position);
+        }
+        if distance >= change {
+            break;
+        }
+    }
+    furthest.1
 }
 
 /// Uniform over [low, high] without the interval nearer than `change` to `now`; the far end if nothing is left.
@@ -135,38 +168,28 @@ fn changed(now: f64, low: f64, high: f64, change: f64, stream: &mut Stream) -> f
     }
 }
 
-/// The largest part position error (m), part rotation error (rad) and joint error (rad or m) from the goal.
-pub(crate) fn goal_errors(scene: &Scene, goal_parts: &[Pose], goal: &ObjectGoal, state: &ObjectState) -> [f64; 3] {
-    let mut errors = [0.0_f64; 3];
+/// The largest errors from the goal: of part positions (m), part rotations (rad), joints that turn (rad) and that slide (m).
+pub(crate) fn goal_errors(scene: &Scene, goal_parts: &[Pose], goal: &ObjectGoal, state: &ObjectState) -> [f64; 4] {
+    let mut errors = [0.0_f64; 4];
     for (wanted, is) in goal_parts.iter().zip(&state.world_from_parts) {
         errors[0] = errors[0].max((wanted.translation.vector - is.translation.vector).norm());
         errors[1] = errors[1].max(rotation_distance(&wanted.rotation, &is.rotation));
     }
     let measured = joint_positions(&scene.object, &state.world_from_parts);
-    for (wanted, is) in goal.joint_positions.iter().zip(&measured) {
-        errors[2] = errors[2].max((wanted - is).abs());
+    for (joint, error) in scene.object.joints.iter().zip(joint_errors(&scene.object, &goal.joint_positions, &measured)) {
+        let kind = match joint.kind {
+            JointKind::Revolute | JointKind::Ball => 2,
+            JointKind::Prismatic => 3,
+            JointKind::Fixed => continue,
+        };
+        errors[kind] = errors[kind].max(error);
     }
     errors
 }
 
-/// The smallest factor on all thresholds at which the object counts as being at its goal.
-pub(crate) fn threshold_factor(
-    scene: &Scene,
-    thresholds: &Thresholds,
-    goal_parts: &[Pose],
-    goal: &ObjectGoal,
-    state: &ObjectState,
-) -> f64 {
-    let [position, rotation, _] = goal_errors(scene, goal_parts, goal, state);
-    let mut factor = (position / thresholds.position).max(rotation / thresholds.rotation_deg.to_radians());
-    let measured = joint_positions(&scene.object, &state.world_from_parts);
-    for ((joint, wanted), is) in scene.object.joints.iter().zip(&goal.joint_positions).zip(&measured) {
-        let allowed = match joint.kind {
-            JointKind::Revolute => thresholds.joint_deg.to_radians(),
-            JointKind::Prismatic => thresholds.joint_m,
-            JointKind::Fixed => continue,
-        };
-        factor = factor.max((wanted - is).abs() / allowed);
-    }
-    factor
+/// The smallest factor on all thresholds at which these errors count as being at the goal.
+pub(crate) fn threshold_factor(thresholds: &Thresholds, errors: &[f64; 4]) -> f64 {
+    let (rotation, turn) = (thresholds.rotation_deg.to_radians(), thresholds.joint_deg.to_radians());
+    let allowed = [thresholds.position, rotation, turn, thresholds.joint_m];
+    errors.iter().zip(allowed).map(|(error, allowed)| error / allowed).fold(0.0, f64::max)
 }

@@ -1,7 +1,6 @@
 //! How well the controller tracks: one arm moves its gripper by 20 cm and 90° in 2 s, free or with a bar in its pads.
 
 use crate::error::Error;
-use crate::planning_world::lowest_gripper_point;
 use crate::scene::{Scene, SceneConfig};
 use crate::simulation::{Grip, Simulation};
 use crate::trial::TrialConfig;
@@ -108,7 +107,7 @@ fn pick_up(simulation: &mut Simulation<'_>, robot: &RobotModel, trial: &TrialCon
     let clearance = trial.grasp.table_clearance;
     let mut at_bar = *world_from_home;
     at_bar.translation.z = BAR[2];
-    at_bar.translation.z += (clearance - lowest_gripper_point(robot, &at_bar, opening)).max(0.0);
+    at_bar.translation.z += (clearance - robot.lowest_gripper_point(&at_bar, opening)).max(0.0);
     let down = Move {
         name: "down",
         shift: at_bar.translation.vector - world_from_home.translation.vector,

@@ -37,7 +37,7 @@ pub struct TrialLine {
     /// Simulated steps.
     pub steps: u64,
     /// Largest position (m), rotation (rad) and joint error (rad or m) at the end.
-    pub final_errors: [f64; 3],
+    pub final_errors: [f64; 4],
     /// The factor on all thresholds at which it would have succeeded; none if it did not get so far.
     pub threshold_factor: Option<f64>,
 }

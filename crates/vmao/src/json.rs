@@ -141,6 +141,12 @@ impl JsonPose {
     pub fn to_pose(&self) -> Option<Pose> {
         normalized(self.quaternion).map(|quaternion| geometry::pose(self.position, quaternion))
     }
+
+    /// The pose, or a refusal of its zero quaternion; `path` is where in `document` it stands.
+    pub fn to_pose_at(&self, document: &Document, path: &JsonPath) -> Result<Pose, DocumentError> {
+        let message = "a zero quaternion, expected a rotation [w, x, y, z]";
+        self.to_pose().ok_or_else(|| document.refuse(&path.clone().then("quaternion"), message.to_owned()))
+    }
 }
 
 impl From<&Pose> for JsonPose {

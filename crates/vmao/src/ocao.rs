@@ -7,14 +7,14 @@ use crate::{
 use nalgebra::{Point3, Unit, Vector3};
 use serde::{
     Deserialize, Deserializer, Serialize,
-    de::{Error, MapAccess, Visitor},
+    de::{Error, MapAccess, SeqAccess, Visitor, value::SeqAccessDeserializer},
 };
 use std::{collections::BTreeMap, fmt};
 use vmao_core::{
     contact::PartId,
     geometry::Pose,
     object::JointKind,
-    object_centric::{WorldJoint, goal_part_poses, gripper_goal},
+    object_centric::{WorldJoint, ball_change, goal_part_poses, gripper_goal},
     object_graph::{GraphError, MAX_PARTS, ObjectGraph},
 };
 
@@ -64,20 +64,20 @@ pub struct PartRequest {
 pub struct JointRequest {
     /// Its name.
     pub name: String,
-    /// Revolute, prismatic or fixed.
+    /// Revolute, prismatic, ball or fixed.
     #[serde(rename = "type", deserialize_with = "kind")]
     pub kind: JointKind,
     /// The part that the motion is relative to.
     pub parent: String,
     /// The part that moves for a positive position.
     pub child: String,
-    /// A point on the axis, world frame (m); asked of revolute joints.
+    /// A point on the axis or the centre of a ball, world frame (m); asked of revolute and ball joints.
     pub anchor: Option<[f64; 3]>,
     /// The axis, world frame, of any length but zero; asked of revolute and prismatic joints.
     pub axis: Option<[f64; 3]>,
-    /// Current position (rad or m); asked of revolute and prismatic joints.
-    pub position: Option<f64>,
-    /// Lowest and highest goal position.
+    /// Current position; asked of all joints that move.
+    pub position: Option<Position>,
+    /// Lowest and highest goal position; of a ball joint, zero and the largest angle from zero.
     pub limits: Option<[f64; 2]>,
 }
 
@@ -101,9 +101,53 @@ pub struct GoalRequest {
     /// World pose of the dependency root.
     #[serde(deserialize_with = "object")]
     pub root_pose: JsonPose,
-    /// Goal position of every joint that moves (rad or m), in document order.
+    /// Goal position of every joint that moves, in document order.
     #[serde(default, deserialize_with = "entries")]
-    pub joint_positions: Vec<(String, f64)>,
+    pub joint_positions: Vec<(String, Position)>,
+}
+
+/// Position of a joint: a number (rad or m), or for a ball joint a rotation vector of three in its parent's frame (rad).
+#[derive(Debug, Clone, PartialEq)]
+pub struct Position(Vec<f64>);
+
+impl<'de> Deserialize<'de> for Position {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        struct Coordinates;
+        impl<'de> Visitor<'de> for Coordinates {
+            type Value = Position;
+
+            fn expecting(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+                formatter.write_str("a number, or a rotation vector [x, y, z]")
+            }
+
+            fn visit_f64<E: Error>(self, number: f64) -> Result<Position, E> {
+                Ok(Position(vec![number]))
+            }
+
+            fn visit_i64<E: Error>(self, number: i64) -> Result<Position, E> {
+                Ok(Position(vec![number as f64]))
+            }
+
+            fn visit_u64<E: Error>(self, number: u64) -> Result<Position, E> {
+                Ok(Position(vec![number as f64]))
+            }
+
+            fn visit_seq<A: SeqAccess<'de>>(self, sequence: A) -> Result<Position, A::Error> {
+                let vector = <[f64; 3]>::deserialize(SeqAccessDeserializer::new(sequence))?;
+                Ok(Position(vector.to_vec()))
+            }
+        }
+        deserializer.deserialize_any(Coordinates)
+    }
+}
+
+impl fmt::Display for Position {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match &self.0[..] {
+            [number] => write!(formatter, "{number}"),
+            numbers => write!(formatter, "{numbers:?}"),
+        }
+    }
 }
 
 /// Where every part and gripper is at the goal, in the order of the request.
@@ -116,10 +160,10 @@ pub struct Answer {
 }
 
 /// A JSON object's entries in order; a repeated key is kept, for [`answer`] to refuse by name.
-fn entries<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Vec<(String, f64)>, D::Error> {
+fn entries<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Vec<(String, Position)>, D::Error> {
     struct Entries;
     impl<'de> Visitor<'de> for Entries {
-        type Value = Vec<(String, f64)>;
+        type Value = Vec<(String, Position)>;
 
         fn expecting(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
             formatter.write_str("an object of joint names and positions")
@@ -139,9 +183,8 @@ fn entries<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Vec<(String, f6
 /// A joint type as a string, and nothing else that serde takes for an enum.
 fn kind<'de, D: Deserializer<'de>>(deserializer: D) -> Result<JointKind, D::Error> {
     let name = String::deserialize(deserializer)?;
-    let kinds = [JointKind::Revolute, JointKind::Prismatic, JointKind::Fixed];
-    let missing = || D::Error::custom(unknown("a joint", "type", &name, kinds.map(kind_name)));
-    kinds.into_iter().find(|&kind| kind_name(kind) == name).ok_or_else(missing)
+    let missing = || D::Error::custom(unknown("a joint", "type", &name, JointKind::ALL.map(JointKind::name)));
+    JointKind::ALL.into_iter().find(|kind| kind.name() == name).ok_or_else(missing)
 }
 
 /// The goal pose of every part and gripper (Eq. 1 and 2), or the first thing that is wrong with the request.
@@ -155,12 +198,12 @@ pub fn answer(document: &Document) -> Result<Answer, DocumentError> {
     let root = parts.find(document, &JsonPath::key("root"), &request.root)?;
 
     let joints = world_joints(document, &request.object, &parts)?;
-    let deltas = joint_deltas(document, &request)?;
     let mut world_from_parts = Vec::with_capacity(request.object.parts.len());
     for (index, part) in request.object.parts.iter().enumerate() {
-        world_from_parts.push(pose(document, JsonPath::key("object").then("parts").at(index).then("pose"), &part.pose)?);
+        world_from_parts.push(part.pose.to_pose_at(document, &JsonPath::key("object").then("parts").at(index).then("pose"))?);
     }
-    let goal_world_from_root = pose(document, JsonPath::key("goal").then("root_pose"), &request.goal.root_pose)?;
+    let deltas = joint_deltas(document, &request, &joints, &world_from_parts)?;
+    let goal_world_from_root = request.goal.root_pose.to_pose_at(document, &JsonPath::key("goal").then("root_pose"))?;
     let goals = goal_part_poses(&graph, &joints, &world_from_parts, &deltas, root, &goal_world_from_root);
 
     let mut answer = Answer { parts: Vec::with_capacity(goals.len()), grippers: Vec::with_capacity(request.grippers.len()) };
@@ -173,7 +216,7 @@ pub fn answer(document: &Document) -> Result<Answer, DocumentError> {
     for (index, gripper) in request.grippers.iter().enumerate() {
         let path = JsonPath::key("grippers").at(index);
         let part = usize::from(parts.find(document, &path.clone().then("part"), &gripper.part)?.0);
-        let world_from_gripper = pose(document, path.clone().then("pose"), &gripper.pose)?;
+        let world_from_gripper = gripper.pose.to_pose_at(document, &path.clone().then("pose"))?;
         let goal = gripper_goal(&world_from_parts[part], &goals[part], &world_from_gripper);
         if !finite(&goal) {
             return refuse(path, overflow("gripper", &gripper.name));
@@ -189,11 +232,6 @@ fn finite(pose: &Pose) -> bool {
 
 fn overflow(kind: &str, name: &str) -> String {
     format!("the goal pose of {kind} {} overflows, expected numbers whose sums and products are finite doubles", quoted(name))
-}
-
-fn pose(document: &Document, path: JsonPath, pose: &JsonPose) -> Result<Pose, DocumentError> {
-    let zero = || document.refuse(&path.then("quaternion"), "a zero quaternion, expected a rotation [w, x, y, z]".to_owned());
-    pose.to_pose().ok_or_else(zero)
 }
 
 /// The parts by name.
@@ -278,22 +316,25 @@ fn world_joints(document: &Document, object: &ObjectRequest, parts: &PartNames<'
     let mut joints = Vec::with_capacity(object.joints.len());
     for (index, joint) in object.joints.iter().enumerate() {
         let path = JsonPath::key("object").then("joints").at(index);
-        let missing = |field: &str| {
-            document.refuse(&path, format!("{} joint {} has no `{field}`", kind_name(joint.kind), quoted(&joint.name)))
-        };
+        let missing =
+            |field: &str| document.refuse(&path, format!("{} joint {} has no `{field}`", joint.kind.name(), quoted(&joint.name)));
         let anchor = match (joint.anchor, joint.kind) {
-            (None, JointKind::Revolute) => return Err(missing("anchor")),
+            (None, JointKind::Revolute | JointKind::Ball) => return Err(missing("anchor")),
             (anchor, _) => anchor.unwrap_or_default(),
         };
         let axis = match (joint.axis, joint.kind) {
-            (None, JointKind::Fixed) => [0.0, 0.0, 1.0],
-            (None, _) => return Err(missing("axis")),
+            (None, JointKind::Fixed | JointKind::Ball) => [0.0, 0.0, 1.0],
+            (None, JointKind::Revolute | JointKind::Prismatic) => return Err(missing("axis")),
             (Some(axis), _) => normalized(axis).ok_or_else(|| {
                 document.refuse(&path.clone().then("axis"), "a zero axis, expected a direction [x, y, z]".to_owned())
             })?,
         };
-        if joint.position.is_none() && joint.kind != JointKind::Fixed {
-            return Err(missing("position"));
+        match &joint.position {
+            None if joint.kind != JointKind::Fixed => return Err(missing("position")),
+            Some(position) => {
+                check_coordinates(joint, position).map_err(|cause| document.refuse(&path.then("position"), cause))?;
+            }
+            None => {}
         }
         joints.push(WorldJoint {
             kind: joint.kind,
@@ -306,16 +347,22 @@ fn world_joints(document: &Document, object: &ObjectRequest, parts: &PartNames<'
     Ok(joints)
 }
 
-fn kind_name(kind: JointKind) -> &'static str {
-    match kind {
-        JointKind::Revolute => "revolute",
-        JointKind::Prismatic => "prismatic",
-        JointKind::Fixed => "fixed",
+/// Whether the position of a joint has as many coordinates as its type asks for.
+fn check_coordinates(joint: &JointRequest, position: &Position) -> Result<(), String> {
+    if position.0.len() == joint.kind.coordinates() {
+        return Ok(());
     }
+    let expected = if joint.kind == JointKind::Ball { "a rotation vector [x, y, z]" } else { "a number" };
+    Err(format!("{position} for {} joint {}, expected {expected}", joint.kind.name(), quoted(&joint.name)))
 }
 
-/// Goal minus current position of every joint, each checked against its limits.
-fn joint_deltas(document: &Document, request: &Request) -> Result<Vec<f64>, DocumentError> {
+/// The change of every joint from its current position to its goal, each goal checked against the joint's limits.
+fn joint_deltas(
+    document: &Document,
+    request: &Request,
+    world_joints: &[WorldJoint],
+    world_from_parts: &[Pose],
+) -> Result<Vec<f64>, DocumentError> {
     let list = JsonPath::key("goal").then("joint_positions");
     let joints = &request.object.joints;
     let mut goals = BTreeMap::new();
@@ -325,35 +372,59 @@ fn joint_deltas(document: &Document, request: &Request) -> Result<Vec<f64>, Docu
         if !names.contains_key(&**name) {
             return Err(document.refuse(&path, unknown("object", "joint", name, joints.iter().map(|joint| &*joint.name))));
         }
-        if goals.insert(&**name, *goal).is_some() {
+        if goals.insert(&**name, goal).is_some() {
             return Err(document.refuse(&path, format!("a second goal for joint {}, expected one", quoted(name))));
         }
     }
     let mut deltas = Vec::with_capacity(joints.len());
     for (index, joint) in joints.iter().enumerate() {
-        let (name, position) = (quoted(&joint.name), joint.position.unwrap_or(0.0));
-        let goal = goals.get(&*joint.name);
+        let (name, goal) = (quoted(&joint.name), goals.get(&*joint.name).copied());
         let path = list.clone().then(&joint.name);
-        if let Some([lower, upper]) = joint.limits {
-            if lower > upper {
-                let limits = JsonPath::key("object").then("joints").at(index).then("limits");
-                let message = format!("limits of joint {name} are [{lower}, {upper}], expected the lower one first");
-                return Err(document.refuse(&limits, message));
-            }
-            if let Some(goal) = goal.filter(|&&goal| goal < lower || goal > upper) {
+        if let Some(goal) = goal {
+            check_coordinates(joint, goal).map_err(|cause| document.refuse(&path, cause))?;
+        }
+        if let Some(limits) = joint.limits {
+            check_ordered(joint, limits)
+                .map_err(|cause| document.refuse(&JsonPath::key("object").then("joints").at(index).then("limits"), cause))?;
+            if let Some(goal) = goal.filter(|goal| !within(joint.kind, goal, limits)) {
+                let [lower, upper] = limits;
                 let message = format!("goal {goal} of joint {name} is outside its limits [{lower}, {upper}]");
                 return Err(document.refuse(&path, message));
             }
         }
-        deltas.push(match (goal, joint.kind) {
-            (None, JointKind::Fixed) => 0.0,
+        let zero = Position(vec![0.0; joint.kind.coordinates()]);
+        let position = joint.position.as_ref().unwrap_or(&zero);
+        match (goal, joint.kind) {
+            (None, JointKind::Fixed) => deltas.push(0.0),
             (None, _) => return Err(document.refuse(&list, format!("no goal for joint {name}, expected one for each joint"))),
-            (Some(&goal), JointKind::Fixed) if goal != position => {
+            (Some(goal), JointKind::Fixed) if goal != position => {
                 let message = format!("goal {goal} of fixed joint {name}, which stays at {position}");
                 return Err(document.refuse(&path, message));
             }
-            (Some(goal), _) => goal - position,
-        });
+            (Some(goal), JointKind::Ball) => {
+                let world_from_parent = world_from_parts[usize::from(world_joints[index].parent.0)].rotation;
+                deltas.extend((world_from_parent * ball_change(&position.0, &goal.0)).iter());
+            }
+            (Some(goal), _) => deltas.push(goal.0[0] - position.0[0]),
+        }
     }
     Ok(deltas)
+}
+
+/// Whether the limits are in order, and those of a ball joint begin at zero.
+fn check_ordered(joint: &JointRequest, [lower, upper]: [f64; 2]) -> Result<(), String> {
+    let name = quoted(&joint.name);
+    if lower > upper {
+        return Err(format!("limits of joint {name} are [{lower}, {upper}], expected the lower one first"));
+    }
+    if joint.kind == JointKind::Ball && lower != 0.0 {
+        return Err(format!("limits of ball joint {name} are [{lower}, {upper}], expected [0, largest angle]"));
+    }
+    Ok(())
+}
+
+/// Whether a goal lies within limits: its number, or the angle of its rotation vector.
+fn within(kind: JointKind, goal: &Position, [lower, upper]: [f64; 2]) -> bool {
+    let size = if kind == JointKind::Ball { Vector3::from_column_slice(&goal.0).norm() } else { goal.0[0] };
+    lower <= size && size <= upper
 }

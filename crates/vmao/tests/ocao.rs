@@ -104,6 +104,57 @@ fn a_mixed_tree_has_its_hand_computed_goal() {
     assert_eq!(answer["grippers"], json!([]));
 }
 
+/// A tip on a ball at the end of an arm that is turned by 90° about z; the ball is at zero.
+fn with_a_ball() -> Value {
+    let half = 0.5_f64.sqrt();
+    json!({
+        "object": {
+            "parts": [{"name": "arm", "pose": {"quaternion": [half, 0, 0, half]}}, {"name": "tip", "pose": {"position": [0, 2, 0]}}],
+            "joints": [{"name": "ball", "type": "ball", "parent": "arm", "child": "tip", "anchor": [0, 1, 0],
+                        "position": [0, 0, 0], "limits": [0, 2]}]
+        },
+        "root": "arm",
+        "goal": {"root_pose": {"quaternion": [half, 0, 0, half]},
+                 "joint_positions": {"ball": [0, -std::f64::consts::FRAC_PI_2, 0]}}
+    })
+}
+
+#[test]
+fn a_ball_joint_turns_by_rotation_vectors_in_its_parents_frame() {
+    let mut request = with_a_ball();
+    // -y of the turned arm is +x of the world: a quarter turn about it takes the tip from +y to +z of the anchor.
+    check_close(&answer(&request)["parts"][1]["pose"]["position"], &[0.0, 1.0, 1.0]);
+    request["root"] = json!("tip");
+    request["goal"]["root_pose"] = json!({"position": [0, 2, 0]});
+    // With the tip at rest the arm turns back: its origin from 1 below the anchor along y to 1 above it along z.
+    check_close(&answer(&request)["parts"][0]["pose"]["position"], &[0.0, 1.0, 1.0]);
+}
+
+#[test]
+fn bad_positions_of_ball_joints_are_refused() {
+    let with = |pointer: &str, value: Value| {
+        let mut request = with_a_ball();
+        *request.pointer_mut(pointer).unwrap() = value;
+        request.to_string()
+    };
+    let goal = "/goal/joint_positions/ball";
+    check_refused(with(goal, json!(0.5)), "0.5 for ball joint `ball`, expected a rotation vector [x, y, z]");
+    check_refused(with(goal, json!([0.5, 1])), "goal.joint_positions.ball");
+    check_refused(with(goal, json!([0, 0, 1, 0])), "goal.joint_positions.ball");
+    check_refused(with(goal, json!([0, "a", 1])), "goal.joint_positions.ball");
+    check_refused(with(goal, json!([2, 0.01, 0])), "goal [2.0, 0.01, 0.0] of joint `ball` is outside its limits [0, 2]");
+    check_refused(with(goal, json!([1e300, 0, 0])), "outside its limits");
+    check_refused(
+        with("/object/joints/0/limits", json!([-1, 2])),
+        "limits of ball joint `ball` are [-1, 2], expected [0, largest angle]",
+    );
+    check_refused(with("/object/joints/0/position", json!(0)), "0 for ball joint `ball`, expected a rotation vector");
+    check_refused(with("/object/joints/0/anchor", Value::Null), "ball joint `ball` has no `anchor`");
+    let mut hinge = example();
+    hinge["goal"]["joint_positions"]["hinge"] = json!([0, 0, 1]);
+    check_refused(hinge.to_string(), "[0.0, 0.0, 1.0] for revolute joint `hinge`, expected a number");
+}
+
 #[test]
 fn one_part_without_joints_carries_its_grippers() {
     let request = json!({"object": {"parts": [{"name": "a", "pose": {"position": [1, 2, 3]}}], "joints": []}, "root": "a",
@@ -180,9 +231,9 @@ fn degenerate_and_non_finite_numbers_are_refused() {
         ("-1e999", "number out of range, expected a finite double"),
         ("NaN", "not JSON"),
         ("Infinity", "NaN and Infinity are not JSON numbers"),
-        ("\"NaN\"", "invalid type: string \"NaN\", expected f64"),
+        ("\"NaN\"", "invalid type: string \"NaN\", expected a number, or a rotation vector"),
         ("null", "goal.joint_positions.hinge (line 1, column "),
-        ("[1]", "expected f64"),
+        ("[1]", "invalid length 1, expected an array of length 3"),
     ] {
         check_refused(text.replace("0.9", literal), message);
     }
@@ -229,8 +280,8 @@ fn malformed_documents_are_refused_with_their_place() {
     check_refused("[".repeat(1 << 20), "expected an object");
     check_refused(format!("{{\"object\": {{\"parts\": {}", "[".repeat(1 << 20)), "object.parts[0]");
     check_refused(
-        with("/object/joints/0/type", json!("ball")),
-        "a joint has no type `ball`; types are: revolute, prismatic, fixed",
+        with("/object/joints/0/type", json!("screw")),
+        "a joint has no type `screw`; types are: revolute, prismatic, ball, fixed",
     );
     for (pointer, message) in [
         ("", "unknown field `extra`, expected one of `object`, `root`, `grippers`, `goal`"),

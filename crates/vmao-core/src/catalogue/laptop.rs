@@ -9,18 +9,19 @@ use super::{CatalogueItem, InstanceSet};
 /// The laptop of this instance, held by its handle and by the screen's tab.
 pub(super) fn item(set: InstanceSet, instance: u16) -> CatalogueItem {
     let mut stream = stream(3, set, instance);
-    let (width, depth) = (stream.range(0.150, 0.185), stream.range(0.105, 0.125));
+    let (width, depth) = (stream.range(0.135, 0.165), stream.range(0.090, 0.105));
     let height = stream.range(0.019, 0.023);
     let tab = Tab { length: stream.range(0.048, 0.056), width: stream.range(0.018, 0.023), thickness: height };
     let lid_tab = Tab { thickness: stream.range(0.018, 0.021), ..tab };
     let lid = Lid { hinge_height: height, depth, width, thickness: stream.range(0.008, 0.011), tab: lid_tab };
-    let (base_mass, lid_mass) = (stream.range(0.16, 0.20), stream.range(0.07, 0.09));
-    let resistance = Resistance { damping: stream.range(0.015, 0.025), friction: stream.range(0.09, 0.11) };
+    let (base_mass, lid_mass) = (stream.range(0.11, 0.14), stream.range(0.048, 0.060));
+    let resistance = Resistance { damping: stream.range(0.015, 0.025), friction: stream.range(0.07, 0.085) };
     let color = pick(&mut stream, &[[0.70, 0.71, 0.73], [0.25, 0.28, 0.33], [0.80, 0.74, 0.62], [0.32, 0.42, 0.50]]);
 
     let base_frame = forward(height / 2.0);
     let base = vec![
-        block([-width / 2.0, -depth, 0.0], [width / 2.0, -0.008, height], color),
+        // Some of it behind the hinge, or a screen far open would tip it over.
+        block([-width / 2.0, -depth, 0.0], [width / 2.0, 0.012, height], color),
         block([-0.42 * width, -0.55 * depth, height], [0.42 * width, -0.14 * depth, height + 0.001], DARK),
         block([-0.12 * width, -0.90 * depth, height], [0.12 * width, -0.65 * depth, height + 0.001], DARK),
         tab.solid(&base_frame, depth, color),

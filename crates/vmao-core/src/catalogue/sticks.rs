@@ -78,7 +78,9 @@ pub(super) fn star(name: &str, count: usize, set: InstanceSet, instance: u16) ->
 
 /// Three sticks end to end; at joint positions zero the outer ones are bent fully to the middle one's right.
 pub(super) fn chain(name: &str, set: InstanceSet, instance: u16) -> CatalogueItem {
-    let stick = Stick::draw(30, set, instance, 0.155);
+    let stick = Stick::draw(30, set, instance, 0.128);
+    // One hand at an end carries all three, a third of a metre of them.
+    let mass = 0.6 * stick.mass;
     let pin = Pin { radius: 0.6 * stick.width, thickness: stick.thickness, layers: 2 };
     let (half, bend) = (stick.length / 2.0, BEND.to_radians());
     // Frames at the hinges: two for the middle stick, one for each of the others.
@@ -92,11 +94,8 @@ pub(super) fn chain(name: &str, set: InstanceSet, instance: u16) -> CatalogueIte
     };
     let mut white: Vec<_> = middle.iter().flat_map(|frame| pin.knuckle(frame, 0, stick.width, COLORS[1])).collect();
     white.push(bar(&middle[0], [pin.reach(), stick.length - pin.reach()], section, COLORS[1]));
-    let parts = vec![
-        part(NAMES[0], stick.mass, end(0, COLORS[0])),
-        part(NAMES[1], stick.mass, white),
-        part(NAMES[2], stick.mass, end(1, COLORS[2])),
-    ];
+    let parts =
+        vec![part(NAMES[0], mass, end(0, COLORS[0])), part(NAMES[1], mass, white), part(NAMES[2], mass, end(1, COLORS[2]))];
     let grip = |part, frame, from: f64, to: f64| Grip {
         part,
         frame,
@@ -104,7 +103,7 @@ pub(super) fn chain(name: &str, set: InstanceSet, instance: u16) -> CatalogueIte
         width: stick.width,
         finger_1: 1.0,
     };
-    let grips = [grip(0, outer[0], 0.6, 0.92), grip(1, middle[0], 0.35, 0.65), grip(2, outer[1], 0.6, 0.92)];
+    let grips = [grip(0, outer[0], 0.6, 0.9), grip(1, middle[0], 0.4, 0.6), grip(2, outer[1], 0.6, 0.9)];
     let joints = vec![hinge(1, -half, 2.0 * bend, stick.resistance), hinge(2, half, 2.0 * bend, stick.resistance)];
     assemble(name, parts, joints, &grips)
 }

@@ -3,13 +3,11 @@
 
 pub(crate) mod problems;
 
-use nalgebra::{UnitQuaternion, Vector3};
 use std::f64::consts::{FRAC_PI_2, FRAC_PI_4};
 use vmao_core::{
-    collision::{ArmCollisionModel, LinkSolid},
+    collision::ArmCollisionModel,
     geometry::{Pose, pose, translation},
     kinematics::{ChainJoint, SerialChain},
-    shape::{Shape, Solid},
 };
 
 type Row = ([f64; 3], [f64; 4], [f64; 2]);
@@ -58,43 +56,8 @@ pub(crate) const PANDA_HOME: [f64; 7] = [0.0, 0.0, 0.0, -FRAC_PI_2, 0.0, FRAC_PI
 /// Sawyer's neutral pose.
 pub(crate) const SAWYER_NEUTRAL: [f64; 7] = [0.0, -1.18, 0.0, 2.18, 0.0, 0.57, 3.3161];
 
-fn solid(shape: Shape, carrier_from_solid: Pose) -> Solid {
-    Solid { shape, carrier_from_solid, color: [0.5; 3] }
-}
-
-/// A capsule between two points of the link frame.
-fn capsule(link: usize, from: [f64; 3], to: [f64; 3], radius: f64) -> LinkSolid {
-    let (a, b) = (Vector3::from(from), Vector3::from(to));
-    let turn = UnitQuaternion::rotation_between(&Vector3::z(), &(b - a)).unwrap_or_default();
-    let place = Pose::from_parts(((a + b) / 2.0).into(), turn);
-    LinkSolid { link, solid: solid(Shape::Capsule { radius, half_length: (b - a).norm() / 2.0 }, place) }
-}
-
-/// The Panda's links, hand and open fingers as capsules and boxes.
+/// The Panda with its gripper open.
 pub(crate) fn panda_model(world_from_base: Pose) -> ArmCollisionModel {
-    let chain = panda();
-    let mut solids = vec![
-        capsule(0, [-0.08, 0.0, 0.06], [0.0, 0.0, 0.06], 0.07),
-        capsule(1, [0.0, 0.0, -0.14], [0.0, 0.0, 0.0], 0.055),
-        capsule(1, [0.0, 0.0, 0.0], [0.0, -0.075, 0.0], 0.055),
-        capsule(2, [0.0, -0.14, 0.0], [0.0, 0.0, 0.0], 0.055),
-        capsule(2, [0.0, 0.0, 0.0], [0.0, 0.0, 0.075], 0.055),
-        capsule(3, [0.0, 0.0, -0.065], [0.0, 0.0, 0.0], 0.055),
-        capsule(3, [0.0, 0.0, 0.0], [0.083, 0.056, 0.0], 0.055),
-        capsule(4, [0.0, 0.0, 0.0], [0.0, 0.0, 0.056], 0.055),
-        capsule(4, [0.0, 0.0, 0.0], [-0.083, 0.069, 0.0], 0.055),
-        capsule(5, [0.0, 0.0, -0.21], [0.0, 0.0, -0.1], 0.055),
-        capsule(5, [0.0, 0.06, -0.1], [0.0, 0.06, 0.0], 0.03),
-        capsule(6, [0.0, 0.0, 0.0], [0.085, 0.0, 0.0], 0.047),
-    ];
-    let flange = Shape::Cylinder { radius: 0.044, half_length: 0.0275 };
-    solids.push(LinkSolid { link: 7, solid: solid(flange, translation(0.0, 0.0, 0.0795)) });
-    let hand = |shape, hand_from_solid: Pose| LinkSolid { link: 7, solid: solid(shape, chain.last_from_tool * hand_from_solid) };
-    let lying = pose([0.0, 0.0, 0.03], [1.0, 1.0, 0.0, 0.0]);
-    solids.push(hand(Shape::Capsule { radius: 0.04, half_length: 0.06 }, lying));
-    for side in [-1.0, 1.0] {
-        let finger = Shape::Box { half_extents: [0.0105, 0.0132, 0.027] };
-        solids.push(hand(finger, translation(0.0, side * 0.0532, 0.0854)));
-    }
-    ArmCollisionModel { chain, world_from_base, solids, ignored_links: vec![(5, 7)] }
+    let robot = vmao_core::robots::panda();
+    robot.collision_model(world_from_base, robot.gripper.max_opening())
 }

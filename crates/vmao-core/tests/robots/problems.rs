@@ -1,11 +1,11 @@
 //! Planning problems by seed: Pandas around a table that must cross each other, with and without boxes in between.
 
-use super::{panda_model, solid};
+use super::panda_model;
 use vmao_core::{
     collision::{CollisionChecker, CollisionWorld, Obstacle},
     geometry::{Pose, pose, translation},
     random::Stream,
-    shape::Shape,
+    shape::{Shape, Solid},
 };
 
 /// A world, a start and a goal.
@@ -28,6 +28,10 @@ pub(crate) fn ring(arms: usize) -> CollisionWorld {
         floor_height: Some(0.0),
         ..CollisionWorld::default()
     }
+}
+
+fn solid(shape: Shape, carrier_from_solid: Pose) -> Solid {
+    Solid { shape, carrier_from_solid, color: [0.5; 3] }
 }
 
 /// A shelf of two boards and two walls, and a post, all within the arms' reach.

@@ -4,8 +4,11 @@ mod cameras;
 mod catalogue;
 mod control;
 mod internal_forces;
+mod inverse_kinematics;
 mod kinematics;
 mod link_meshes;
+mod object_trees;
+mod starts_and_goals;
 #[path = "../../tests/support/mod.rs"]
 mod support;
 mod witness;

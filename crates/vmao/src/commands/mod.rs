@@ -6,8 +6,10 @@
 mod demo;
 mod evaluate;
 mod explore;
+mod ik;
 mod object;
 mod ocao;
+mod plan;
 mod report;
 mod robot;
 mod scene;
@@ -53,6 +55,10 @@ enum Command {
     Scene(scene::SceneArguments),
     /// Goal poses of all parts and grippers from a root pose and joint positions (object-centric control)
     Ocao(ocao::OcaoArguments),
+    /// Joint positions that put a robot's flange or tool at given poses
+    Ik(ik::IkArguments),
+    /// A collision-free path of several arms at once
+    Plan(plan::PlanArguments),
 }
 
 /// Runs the program on these arguments, its own name first: 0 done, 1 the work failed, 2 bad input or usage.
@@ -97,7 +103,9 @@ fn execute(command: Command, command_line: &[String]) -> Result<(), Failure> {
         Command::Report(arguments) => report::run(&arguments, &session(&arguments.common)?),
         Command::Robot(arguments) => robot::run(&arguments, &session(arguments.action.common())?),
         Command::Scene(arguments) => scene::run(&arguments, &session(&arguments.common)?),
+        Command::Ik(arguments) => ik::run(&arguments, &session(&arguments.common)?),
         Command::Ocao(arguments) => ocao::run(&arguments, &session(&arguments.common)?),
+        Command::Plan(arguments) => plan::run(&arguments, &session(&arguments.common)?),
     }
 }
 
