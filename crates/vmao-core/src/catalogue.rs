@@ -73,7 +73,7 @@ pub enum InstanceSet {
 }
 
 /// Names of all catalogue objects.
-pub const NAMES: [&str; 15] = [
+pub const NAMES: [&str; 16] = [
     "pliers",
     "scissors",
     "stapler",
@@ -84,6 +84,7 @@ pub const NAMES: [&str; 15] = [
     "cabinet",
     "three-sticks",
     "three-sticks-chain",
+    "sticks-1",
     "sticks-2",
     "sticks-3",
     "sticks-4",

@@ -1,4 +1,4 @@
-//! Rectangular sticks: n of them on one axis as a star, or three end to end as a chain.
+//! Rectangular sticks: n of them on one axis as a star, one alone for a single arm, or three end to end as a chain.
 //!
 //! Object frame: z is the axis of all hinges, the sticks lie in the plane z = 0. The first three are red, white and blue.
 
@@ -9,18 +9,24 @@ use nalgebra::{Point3, Vector3};
 use std::f64::consts::PI;
 
 /// Fewest and most sticks of a star.
-pub(super) const COUNTS: std::ops::RangeInclusive<usize> = 2..=6;
+pub(super) const COUNTS: std::ops::RangeInclusive<usize> = 1..=6;
 
 const NAMES: [&str; 6] = ["red", "white", "blue", "green", "yellow", "violet"];
 const COLORS: [[f32; 3]; 6] =
     [[0.78, 0.10, 0.12], [0.93, 0.93, 0.91], [0.10, 0.22, 0.70], [0.12, 0.50, 0.22], [0.92, 0.75, 0.12], [0.48, 0.18, 0.60]];
 
-/// Smallest and largest angle between neighbours in a star (degrees), and the sticks' mean length (m), by count from two.
+/// Smallest and largest angle between neighbours in a star (degrees), and the sticks' mean length (m), by count from one.
 ///
 /// The largest angles add up to less than a full turn by the smallest one, so that first and last keep apart too. Sticks
 /// are longer where they are many, because every Panda hand beside them is 20 cm across.
-const STARS: [([f64; 2], f64); 5] =
-    [([80.0, 140.0], 0.155), ([80.0, 140.0], 0.170), ([75.0, 94.0], 0.200), ([60.0, 74.0], 0.225), ([50.0, 61.0], 0.250)];
+const STARS: [([f64; 2], f64); 6] = [
+    ([80.0, 140.0], 0.155),
+    ([80.0, 140.0], 0.155),
+    ([80.0, 140.0], 0.170),
+    ([75.0, 94.0], 0.200),
+    ([60.0, 74.0], 0.225),
+    ([50.0, 61.0], 0.250),
+];
 
 /// How far a chain's neighbours bend to either side (degrees).
 const BEND: f64 = 60.0;
