@@ -1,11 +1,10 @@
 //! `vmao ik` through the real binary: the answer for both robots and frames, and every refusal with its place.
 #![expect(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
+mod program;
+
 use serde_json::{Value, json};
-use std::{
-    io::Write,
-    process::{Command, Output, Stdio},
-};
+use std::process::{Command, Output};
 use vmao_core::{
     geometry::{Pose, position_quaternion, rotation_distance},
     kinematics::SerialChain,
@@ -14,35 +13,18 @@ use vmao_core::{
 };
 
 fn ik(arguments: &[&str], request: impl AsRef<[u8]>) -> Output {
-    let mut child = Command::new(env!("CARGO_BIN_EXE_vmao"))
-        .args(["ik", "-"])
-        .args(arguments)
-        .stdin(Stdio::piped())
-        .stdout(Stdio::piped())
-        .stderr(Stdio::piped())
-        .spawn()
-        .unwrap();
-    // A refusal may come before the whole request was read.
-    drop(child.stdin.take().unwrap().write_all(request.as_ref()));
-    child.wait_with_output().unwrap()
+    program::run("ik", arguments, request)
 }
 
 const PANDA_TOOL: [&str; 5] = ["--robot", "panda", "--frame", "tool", "--json"];
 
 fn answers(arguments: &[&str], request: &Value) -> Vec<Value> {
-    let output = ik(arguments, request.to_string());
-    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
-    assert!(output.stderr.is_empty());
-    serde_json::from_slice(&output.stdout).unwrap()
+    serde_json::from_value(program::answer(&ik(arguments, request.to_string()))).unwrap()
 }
 
 #[track_caller]
 fn check_refused(arguments: &[&str], request: impl AsRef<[u8]>, message: &str) {
-    let output = ik(arguments, request);
-    let error = String::from_utf8(output.stderr).unwrap();
-    assert_eq!(output.status.code(), Some(2), "{error}");
-    assert!(error.contains(message), "{error}");
-    assert!(output.stdout.is_empty() && !error.contains("panicked"), "{error}");
+    program::check_refusal(ik(arguments, request), message);
 }
 
 fn target(pose: &Pose) -> Value {

@@ -1,39 +1,22 @@
 //! `vmao ocao` through the real binary: the answer, and every refusal with its place.
 #![expect(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
+mod program;
+
 use serde_json::{Value, json};
-use std::{
-    io::Write,
-    process::{Command, Output, Stdio},
-};
+use std::process::Output;
 
 fn ocao(request: impl AsRef<[u8]>) -> Output {
-    let mut child = Command::new(env!("CARGO_BIN_EXE_vmao"))
-        .args(["ocao", "-", "--json"])
-        .stdin(Stdio::piped())
-        .stdout(Stdio::piped())
-        .stderr(Stdio::piped())
-        .spawn()
-        .unwrap();
-    // A refusal may come before the whole request was read.
-    drop(child.stdin.take().unwrap().write_all(request.as_ref()));
-    child.wait_with_output().unwrap()
+    program::run("ocao", &["--json"], request)
 }
 
 fn answer(request: &Value) -> Value {
-    let output = ocao(request.to_string());
-    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
-    assert!(output.stderr.is_empty());
-    serde_json::from_slice(&output.stdout).unwrap()
+    program::answer(&ocao(request.to_string()))
 }
 
 #[track_caller]
 fn check_refused(request: impl AsRef<[u8]>, message: &str) {
-    let output = ocao(request);
-    let error = String::from_utf8(output.stderr).unwrap();
-    assert_eq!(output.status.code(), Some(2), "{error}");
-    assert!(error.contains(message), "{error}");
-    assert!(output.stdout.is_empty() && error.lines().count() == 1 && !error.contains("panicked"), "{error}");
+    assert_eq!(program::check_refusal(ocao(request), message).lines().count(), 1);
 }
 
 /// The example of the interface description.

@@ -1,42 +1,25 @@
 //! `vmao plan` through the real binary: paths, reasons, and every refusal with its place.
 #![expect(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
+mod program;
+
 use serde_json::{Value, json};
-use std::{
-    io::Write,
-    process::{Command, Output, Stdio},
-};
+use std::process::Output;
 use vmao_core::robots::RobotModel;
 
 const HOME: [f64; 7] = [0.0, -0.785, 0.0, -2.356, 0.0, 1.571, 0.785];
 
 fn run(request: impl AsRef<[u8]>, options: &[&str]) -> Output {
-    let mut child = Command::new(env!("CARGO_BIN_EXE_vmao"))
-        .args(["plan", "-"])
-        .args(options)
-        .stdin(Stdio::piped())
-        .stdout(Stdio::piped())
-        .stderr(Stdio::piped())
-        .spawn()
-        .unwrap();
-    drop(child.stdin.take().unwrap().write_all(request.as_ref()));
-    child.wait_with_output().unwrap()
+    program::run("plan", options, request)
 }
 
 fn answer(request: &Value) -> Value {
-    let output = run(request.to_string(), &["--json"]);
-    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
-    assert!(output.stderr.is_empty());
-    serde_json::from_slice(&output.stdout).unwrap()
+    program::answer(&run(request.to_string(), &["--json"]))
 }
 
 #[track_caller]
 fn check_refused(request: impl AsRef<[u8]>, message: &str) {
-    let output = run(request, &["--json"]);
-    let error = String::from_utf8(output.stderr).unwrap();
-    assert_eq!(output.status.code(), Some(2), "{error}");
-    assert!(error.contains(message), "{error}");
-    assert!(output.stdout.is_empty() && error.lines().count() == 1 && !error.contains("panicked"), "{error}");
+    assert_eq!(program::check_refusal(run(request, &["--json"]), message).lines().count(), 1);
 }
 
 /// A quarter turn to the right, and back again for the second arm if there is one.
