@@ -1,5 +1,6 @@
 //! A scene: arms around a table, one object, the compiled simulator model and who owns which of its geoms.
 
+use crate::convention::Data;
 use crate::convention::ball_joint_position;
 use crate::error::Error;
 use crate::layout::{BasePlacement, Layout, Spacing, base_poses};
@@ -128,7 +129,34 @@ impl Scene {
         }
         let spacing = Spacing { distance: config.base_distance, between: config.base_spacing };
         let world_from_bases = base_poses(config.layout, spacing, &config.bases, &robots)?;
-        Self::compile(config, robots, world_from_bases, item)
+        let scene = Self::compile(config, robots, world_from_bases, item)?;
+        scene.check_placement()?;
+        Ok(scene)
+    }
+
+    /// Refuses arms that stand in each other or in the table while they are at home.
+    fn check_placement(&self) -> Result<(), Error> {
+        const DEEP: f64 = 0.005; // m: more than a link that rests on the table
+        let mut data = Data::new(self.model.clone());
+        for (arm, robot) in self.arms.iter().zip(&self.robots) {
+            data.qpos_mut()[arm.qpos..arm.qpos + JOINTS].copy_from_slice(&robot.home);
+        }
+        data.forward();
+        for contact in data.contact().iter().filter(|contact| contact.dist < -DEEP) {
+            let [first, second] = contact.geom.map(|geom| match self.owners[geom as usize] {
+                Owner::Link(arm) | Owner::Pad(arm, _) => Some(format!("arm {}", arm.0)),
+                Owner::Table => Some("the table".to_owned()),
+                Owner::Part(_) => None,
+            });
+            if let (Some(first), Some(second)) = (first, second)
+                && first != second
+            {
+                let depth = -contact.dist * 1e3;
+                let cause = format!("{first} and {second} overlap by {depth:.0} mm at home, expected bases that keep them apart");
+                return Err(Error::Placement { cause });
+            }
+        }
+        Ok(())
     }
 
     /// The object alone on the table: for what needs no arms.

@@ -1,16 +1,19 @@
 //! Our kinematics against the simulator's, which knows nothing of ours but the written scene.
 
 use super::settled;
-use super::support::{mixed_scene, scene};
+use super::support::{configuration, mixed_scene, scene};
 use crate::convention::{Data, body_pose, free_joint_position, hinge_jacobian};
-use crate::scene::{Owner, Scene};
+use crate::layout::{BasePlacement, Layout};
+use crate::scene::{Owner, Scene, SceneConfig};
 use crate::simulation::Grip;
 use mujoco_rs::wrappers::mj_model::MjtObjBase;
 use nalgebra::{Matrix3, Vector3};
+use vmao_core::catalogue::{InstanceSet, item};
 use vmao_core::contact::PartId;
 use vmao_core::geometry::{Pose, rotation_distance, rotation_exp};
 use vmao_core::object_centric::{joint_positions, part_poses};
 use vmao_core::random::Stream;
+use vmao_core::robots::{panda, sawyer};
 
 #[track_caller]
 fn check_same(ours: &Pose, theirs: &Pose, what: &str) {
@@ -149,4 +152,18 @@ fn the_objects_state_is_read_back_as_it_was_set() {
         let moved = simulation.joint_positions(arm).iter().zip(home).map(|(q, home)| (q - home).abs()).fold(0.0, f64::max);
         assert!(moved < 1e-3, "arm {arm} left home by {moved} rad while the object settled");
     }
+}
+
+#[test]
+fn arms_that_stand_in_each_other_or_in_the_table_are_refused() {
+    let (physics, _) = configuration();
+    let refused = |second: [f64; 3]| {
+        let base = |position, yaw_deg| BasePlacement { position, yaw_deg };
+        let bases = vec![base([-0.58, 0.0, 0.0], 0.0), base(second, 180.0)];
+        let config = SceneConfig { layout: Layout::Explicit, bases, ..physics.clone() };
+        Scene::new(&config, vec![panda(), sawyer(2)], item("pliers", InstanceSet::Train, 0).unwrap()).err().map(|e| e.to_string())
+    };
+    assert!(refused([-0.58, 0.0, 0.0]).unwrap().contains("arm 0 and arm 1 overlap by"));
+    assert!(refused([0.58, 0.0, -5.0]).unwrap().contains("the table"));
+    assert_eq!(refused([0.58, 0.0, 0.0]), None);
 }

@@ -30,8 +30,8 @@ pub struct CommonOptions {
     #[arg(long, value_name = "N", default_value_t = 0)]
     pub seed: u64,
     /// Threads; never changes a result [default: all cores]
-    #[arg(long, value_name = "N")]
-    pub workers: Option<NonZeroUsize>,
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=256))]
+    pub workers: Option<u16>,
     /// Directory for what is written
     #[arg(long, value_name = "DIR")]
     pub out: Option<PathBuf>,
@@ -70,7 +70,7 @@ impl Session {
         Ok(Self {
             config,
             info,
-            workers: options.workers.map_or_else(cores, NonZeroUsize::get),
+            workers: options.workers.map_or_else(cores, usize::from),
             out: options.out.clone(),
             layout: if options.json { Layout::Line } else { Layout::Indented },
         })
