@@ -62,10 +62,19 @@ impl RunInfo {
 
     /// Writes `config.toml` and `run.json` into `directory`.
     pub fn save(&self, directory: &Path, config: &Config) -> io::Result<()> {
+        self.save_as(&directory.join("config.toml"), &directory.join("run.json"), config)
+    }
+
+    /// Writes `NAME.config.toml` and `NAME.run.json` beside an output `NAME.xml` or the like.
+    pub fn save_beside(&self, output: &Path, config: &Config) -> io::Result<()> {
+        self.save_as(&output.with_extension("config.toml"), &output.with_extension("run.json"), config)
+    }
+
+    fn save_as(&self, config_file: &Path, run_file: &Path, config: &Config) -> io::Result<()> {
         let text = config.to_toml().map_err(io::Error::other)?;
-        write_whole(&directory.join("config.toml"), |file| file.write_all(text.as_bytes()))?;
+        write_whole(config_file, |file| file.write_all(text.as_bytes()))?;
         let json = serde_json::to_string_pretty(self)?;
-        write_whole(&directory.join("run.json"), |file| writeln!(file, "{json}"))
+        write_whole(run_file, |file| writeln!(file, "{json}"))
     }
 }
 

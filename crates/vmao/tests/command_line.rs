@@ -83,6 +83,23 @@ fn outputs_lie_beside_the_resolved_configuration_and_the_program() {
 }
 
 #[test]
+fn a_scene_lies_beside_its_configuration_for_one_arm_and_explicit_bases() {
+    let directory = tempfile::tempdir().unwrap();
+    let bases = "scene.bases=[{position=[-0.5, 0.1, 0.0], yaw_deg=0.0}]";
+    let one_arm =
+        ["--set", "object.name=sticks-1", "--set", "robots.names=[\"sawyer\"]", "--set", "scene.layout=explicit", "--set", bases];
+    let output = vmao(directory.path(), &[&["scene", "--out", "one.xml"], &one_arm[..]].concat());
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    let read = |name: &str| fs::read_to_string(directory.path().join(name)).unwrap();
+    assert!(read("one.xml").contains("arm0/right_l6") && !read("one.xml").contains("arm1/"));
+    assert!(read("one.run.json").contains(env!("CARGO_PKG_VERSION")) && read("one.config.toml").contains("-0.5"));
+    let again = vmao(directory.path(), &["scene", "--out", "again.xml", "--config", "one.config.toml"]);
+    assert!(again.status.success(), "{}", String::from_utf8_lossy(&again.stderr));
+    assert_eq!(read("again.xml"), read("one.xml"));
+    check_refused(&["scene", "--out", "."], "is a directory, expected the name of a file");
+}
+
+#[test]
 fn a_full_disk_is_a_failure_of_the_work_and_a_closed_pipe_is_none() {
     let directory = tempfile::tempdir().unwrap();
     fs::write(directory.path().join("a.json"), REQUEST).unwrap();

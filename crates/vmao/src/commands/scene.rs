@@ -23,6 +23,9 @@ pub(super) struct SceneArguments {
 
 pub(super) fn run(arguments: &SceneArguments, session: &Session) -> Result<(), Failure> {
     let path = session.out.clone().unwrap_or_else(|| PathBuf::from("scene.xml"));
+    if path.is_dir() {
+        return Err(Failure::bad_input(format!("{}: is a directory, expected the name of a file to write", path.display())));
+    }
     let scenes = scenes(&session.config, InstanceSet::Train)?;
     let scene = scenes.first().ok_or_else(|| Failure::bad_input("the object has no sizes"))?;
     let mut meshes = Vec::new();
@@ -35,5 +38,6 @@ pub(super) fn run(arguments: &SceneArguments, session: &Session) -> Result<(), F
         scene.mjcf_with_meshes(&session.config.scene, &meshes).or_bad_input()?
     };
     write_whole(&path, |file| file.write_all(mjcf.as_bytes())).with_context(|| path.display().to_string())?;
+    session.info.save_beside(&path, &session.config).with_context(|| path.display().to_string())?;
     session.print(&json!({ "scene": path }))
 }
