@@ -1,13 +1,16 @@
 //! Draws the contact sheet of the catalogue and prints its table, as they stand in `docs/catalogue.md`:
 //! `cargo run -p vmao-sim --example catalogue_sheet -- docs/catalogue.png`.
 
+#[path = "../tests/support/mod.rs"]
+mod support;
+
 use std::error::Error;
 use std::fs::File;
 use std::io::BufWriter;
 use vmao_core::catalogue::{CatalogueItem, INSTANCES, InstanceSet, NAMES, item};
 use vmao_core::object::JointKind;
 use vmao_core::robots::RobotModel;
-use vmao_sim::{Picture, SceneConfig, portrait};
+use vmao_sim::{Picture, portrait};
 
 const COLUMNS: usize = 5;
 /// Of each object's picture (pixels).
@@ -15,14 +18,9 @@ const TILE: [usize; 2] = [250, 200];
 /// Size of a dot of the letters (pixels).
 const DOT: usize = 2;
 
-#[derive(serde::Deserialize)]
-struct Shipped {
-    scene: SceneConfig,
-}
-
 fn main() -> Result<(), Box<dyn Error>> {
     let path = std::env::args().nth(1).ok_or("expected the path of the picture to write")?;
-    let Shipped { scene } = toml::from_str(include_str!("../../../configs/demo.toml"))?;
+    let (scene, _) = support::configuration();
     let [width, height] = TILE;
     let rows = NAMES.len().div_ceil(COLUMNS);
     let mut sheet =

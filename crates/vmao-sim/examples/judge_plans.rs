@@ -1,5 +1,8 @@
 //! Plans every problem of the sets, judges the paths by MuJoCo at 0.01 rad and checks their timing: `judge_plans [COUNT]`
 
+#[path = "../tests/support/mod.rs"]
+mod support;
+
 use std::error::Error;
 use vmao_core::{
     planning::{PlanOutcome, PlanSettings, plan, time_path},
@@ -8,17 +11,11 @@ use vmao_core::{
     robots::RobotModel,
     time_parameterization::{MotionLimits, Trajectory},
 };
-use vmao_sim::{CollisionJudge, SceneConfig};
-
-/// The section of the shipped configuration that the judge needs.
-#[derive(serde::Deserialize)]
-struct Shipped {
-    scene: SceneConfig,
-}
+use vmao_sim::CollisionJudge;
 
 #[expect(clippy::print_stdout, reason = "a measurement is printed")]
 fn main() -> Result<(), Box<dyn Error>> {
-    let Shipped { scene } = toml::from_str(include_str!("../../../configs/demo.toml"))?;
+    let (scene, _) = support::configuration();
     let count = std::env::args().nth(1).map_or(Ok(100), |count| count.parse())?;
     let sets = ["panda", "panda,panda", "panda,panda,panda", "sawyer", "sawyer,sawyer", "sawyer,sawyer,sawyer", "panda,sawyer"];
     println!(

@@ -2,21 +2,14 @@
 //!
 //! Arguments: simulated seconds, object, seed.
 
-use serde::Deserialize;
+#[path = "../tests/support/mod.rs"]
+mod support;
+
 use std::error::Error;
 use vmao_core::catalogue::{InstanceSet, item};
-use vmao_core::osc::OscGains;
 use vmao_core::robots::panda;
 use vmao_sim::throughput::random_rollout;
-use vmao_sim::{Scene, SceneConfig, StartConfig, profile};
-
-/// The sections of the shipped configuration that this needs.
-#[derive(Deserialize)]
-struct Shipped {
-    scene: SceneConfig,
-    start: StartConfig,
-    osc: OscGains,
-}
+use vmao_sim::{Scene, profile};
 
 #[expect(clippy::print_stdout, reason = "a measurement is printed")]
 fn main() -> Result<(), Box<dyn Error>> {
@@ -24,11 +17,11 @@ fn main() -> Result<(), Box<dyn Error>> {
     let [_, seconds, object, seed] = arguments.as_slice() else {
         return Err("expected three arguments: simulated seconds, object, seed".into());
     };
-    let Shipped { scene, start, osc } = toml::from_str(include_str!("../../../configs/demo.toml"))?;
+    let (scene, trial) = support::configuration();
     let item = item(object, InstanceSet::Train, 0).ok_or("no such object in the catalogue")?;
     let scene = Scene::new(&scene, vec![panda(), panda()], item)?;
     profile::start();
-    let rollout = random_rollout(&scene, osc, &start, seconds.parse()?, seed.parse()?);
+    let rollout = random_rollout(&scene, trial.osc, &trial.start, seconds.parse()?, seed.parse()?);
     let [physics, control, ..] = profile::seconds().unwrap_or_default();
     println!(
         r#"{{"steps": {}, "contacts": {:.2}, "hand_paths": {:?}, "position_error": {:.6}, "rotation_error": {:.6}, "outside": {:.4}}}"#,

@@ -1,34 +1,18 @@
 //! Prints, as Markdown tables, how well the controller tracks and how hard arms that hold one object work against each other.
 
+#[path = "../tests/support/mod.rs"]
+mod support;
+
 use std::error::Error;
 use vmao_core::catalogue::{self, InstanceSet};
 use vmao_core::contact_model::FixedTuple;
 use vmao_core::order::GraspOrder;
-use vmao_core::osc::OscGains;
 use vmao_core::robots::{DEFAULT_SLOT, panda, sawyer};
 use vmao_sim::tracking::{Posture, standard_moves, track};
-use vmao_sim::{
-    CameraConfig, GoalConfig, GraspConfig, Layout, MotionConfig, MotionMeasures, Recording, Scene, SceneConfig, StartConfig,
-    Thresholds, TrialConfig, run_trial,
-};
-
-/// The sections of the shipped configuration that a trial needs.
-#[derive(serde::Deserialize)]
-struct Shipped {
-    scene: SceneConfig,
-    start: StartConfig,
-    goal: GoalConfig,
-    thresholds: Thresholds,
-    cameras: CameraConfig,
-    grasp: GraspConfig,
-    motion: MotionConfig,
-    osc: OscGains,
-}
+use vmao_sim::{Layout, MotionMeasures, Recording, Scene, SceneConfig, TrialConfig, run_trial};
 
 fn main() -> Result<(), Box<dyn Error>> {
-    let Shipped { scene, start, goal, thresholds, cameras, grasp, motion, osc } =
-        toml::from_str(include_str!("../../../configs/demo.toml"))?;
-    let trial = TrialConfig { start, goal, thresholds, cameras, grasp, motion, osc };
+    let (scene, trial) = support::configuration();
     tracking_errors(&scene, &trial)?;
     internal_forces(&scene, &trial)
 }
