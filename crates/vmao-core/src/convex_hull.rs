@@ -4,7 +4,7 @@ mod around;
 mod measure;
 
 use measure::Measures;
-use nalgebra::{Matrix3, Point3, UnitQuaternion, Vector3};
+use nalgebra::{Matrix3, Point3, Rotation3, Vector3};
 use serde::{Deserialize, Serialize};
 use std::{fmt, sync::Arc};
 use thiserror::Error;
@@ -49,7 +49,9 @@ pub enum HullError {
         count: usize,
     },
     /// A hole, or faces that turn against their neighbours, or more than two at one edge.
-    #[error("the edge from vertex {from} to {to} is not shared by two faces with the same sense of turn, expected a closed surface")]
+    #[error(
+        "the edge from vertex {from} to {to} is not shared by two faces with the same sense of turn, expected a closed surface"
+    )]
     Open {
         /// The edge's start in the walk around one face.
         from: u32,
@@ -57,7 +59,9 @@ pub enum HullError {
         to: u32,
     },
     /// Several surfaces, a surface with handles, or vertices that no face uses.
-    #[error("{vertices} vertices and {faces} faces, expected one surface like a ball's with every vertex used: 2·vertices − 4 faces")]
+    #[error(
+        "{vertices} vertices and {faces} faces, expected one surface like a ball's with every vertex used: 2·vertices − 4 faces"
+    )]
     Topology {
         /// Number of vertices.
         vertices: usize,
@@ -298,8 +302,9 @@ fn furthest(vertices: &[Point3<f64>], direction: &Vector3<f64>) -> (usize, f64) 
 impl Capsule {
     /// Along the direction in which the mass is drawn out the most.
     fn around(vertices: &[Point3<f64>], measures: &Measures) -> Self {
-        let axes = measures.inertia.symmetric_eigen();
-        let turn = UnitQuaternion::from_matrix(&axes.eigenvectors);
+        let axes = measures.inertia.symmetric_eigen().eigenvectors;
+        let (x, y) = (axes.column(0).into_owned(), axes.column(1).into_owned());
+        let turn = Rotation3::from_basis_unchecked(&[x, y, x.cross(&y)]);
         let local: Vec<Point3<f64>> = vertices.iter().map(|vertex| turn.inverse() * vertex).collect();
         let (low, high) = measure::corners(&local);
         let middle = turn * ((low + high) / 2.0);
@@ -308,9 +313,7 @@ impl Capsule {
         let axis = turn * Vector3::ith(extent.imax(), 1.0);
         let across = |offset: &Vector3<f64>| (offset - axis * offset.dot(&axis)).norm();
         let girth = offsets().map(|offset| across(&offset)).fold(0.0, f64::max);
-        let beyond = |offset: Vector3<f64>| {
-            offset.dot(&axis).abs() - (girth * girth - across(&offset).powi(2)).max(0.0).sqrt()
-        };
+        let beyond = |offset: Vector3<f64>| offset.dot(&axis).abs() - (girth * girth - across(&offset).powi(2)).max(0.0).sqrt();
         let half = offsets().map(beyond).fold(0.0, f64::max);
         let bound = offsets().map(|offset| offset.norm()).fold(0.0, f64::max);
         Self { middle, spine: axis * half, girth, bound }
