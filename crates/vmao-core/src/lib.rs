@@ -4,6 +4,7 @@
 //! contacts, grasp orders and outcomes. This crate knows nothing of the simulator, of tensors, of files,
 //! of the clock or of threads.
 
+pub mod antipodal;
 pub mod catalogue;
 pub mod collision;
 mod collision_checker;
@@ -11,6 +12,7 @@ pub mod contact;
 pub mod contact_model;
 pub mod convex_hull;
 mod coordination;
+pub mod coverage;
 mod damped_least_squares;
 pub mod distance;
 pub mod geometry;
@@ -30,6 +32,7 @@ pub mod outcome;
 pub mod planning;
 pub mod planning_problems;
 pub mod random;
+pub mod ray;
 pub mod record;
 pub mod robots;
 pub mod rollout;

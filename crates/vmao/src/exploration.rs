@@ -1,5 +1,6 @@
 //! Algorithm 1 on disk: rounds of trials that grow the label set, each kept for good before the next begins.
 
+use crate::acceptance::{Acceptance, AcceptanceSummary};
 use crate::config::Config;
 use crate::dataset::{DatasetWriter, digest, read_shard};
 use crate::failure::Failure;
@@ -25,6 +26,9 @@ pub struct Explored {
     pub rate: f64,
     /// SHA-256 of the records in canonical order.
     pub digest: String,
+    /// Near-duplicates, failures and coverage.
+    #[serde(flatten)]
+    pub acceptance: AcceptanceSummary,
 }
 
 /// Explores into `directory` until there are enough successes or too many trials; goes on from what is there.
@@ -36,10 +40,19 @@ pub fn explore(config: &Config, seed: u64, directory: &Path) -> Result<(Explored
     let (trial_config, settings) = (config.trial_config(), &config.explore);
     let proposals = Proposals { radius: settings.radius, orders: config.explored_orders() };
     let mut labels = LabelSet::demonstrated(&scenes);
+    let mut acceptance = Acceptance::new(settings, &scenes);
+    let learn = |acceptance: &mut Acceptance, labels: &mut LabelSet, round: &[TrialRecord]| {
+        for record in round {
+            let scene = scene_of_trial(seed, record.index, scenes.len());
+            if acceptance.add(scene, record) {
+                labels.learn(scene, record);
+            }
+        }
+    };
     let mut records: Vec<TrialRecord> = Vec::new();
     for shard in writer.shards()? {
         let round = read_shard(&shard)?;
-        round.iter().for_each(|record| labels.learn(scene_of_trial(seed, record.index, scenes.len()), record));
+        learn(&mut acceptance, &mut labels, &round);
         records.extend(round);
     }
     let bar = progress_bar("explore", settings.successes);
@@ -47,6 +60,7 @@ pub fn explore(config: &Config, seed: u64, directory: &Path) -> Result<(Explored
     while found(&records) < settings.successes && (records.len() as u64) < settings.max_trials {
         let first = records.len() as u64;
         let last = (first + settings.round_size).min(settings.max_trials);
+        let so_far = acceptance.words();
         let (before, tried) = (found(&records), AtomicU64::new(first));
         bar.set_position(before.min(settings.successes));
         let done = |trial: &vmao_sim::Trial| {
@@ -54,17 +68,23 @@ pub fn explore(config: &Config, seed: u64, directory: &Path) -> Result<(Explored
             if trial.record.outcome.is_success() {
                 bar.inc(1);
             }
-            bar.set_prefix(format!("{tried} trials, {:.0} % accepted", 100.0 * bar.position() as f64 / tried as f64));
+            bar.set_prefix(format!("{tried} trials, {:.0} % accepted, {so_far}", 100.0 * bar.position() as f64 / tried as f64));
         };
         let trials = explore_round(&scenes, &trial_config, &labels, &proposals, (seed, first..last), &done);
         let round: Vec<TrialRecord> = trials.into_iter().map(|trial| crate::dataset::stored(trial.record)).collect();
         writer.write_round(&round)?;
-        round.iter().for_each(|record| labels.learn(scene_of_trial(seed, record.index, scenes.len()), record));
+        learn(&mut acceptance, &mut labels, &round);
         records.extend(round);
     }
     bar.finish();
     let (trials, successes) = (records.len() as u64, found(&records));
-    let explored = Explored { trials, successes, rate: successes as f64 / trials.max(1) as f64, digest: digest(&records) };
+    let explored = Explored {
+        trials,
+        successes,
+        rate: successes as f64 / trials.max(1) as f64,
+        digest: digest(&records),
+        acceptance: acceptance.summary(),
+    };
     Ok((explored, records))
 }
 

@@ -2,14 +2,17 @@
 //!
 //! It knows files and people; the simulator's pointers and the network's tensors stay in their own crates.
 
+pub mod acceptance;
 pub mod commands;
 pub mod config;
 mod config_layers;
 pub mod dataset;
+pub mod demonstrations;
 pub mod evaluation;
 pub mod exploration;
 pub mod failure;
 pub mod ik;
+pub mod inputs;
 pub mod json;
 mod json_place;
 pub mod learned_contacts;
