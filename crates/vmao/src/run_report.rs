@@ -1,6 +1,7 @@
 //! The report of a run directory: reads what the run left, runs again the few trials that are shown.
 
 use crate::config::Config;
+use crate::contact_maps::latent_maps;
 use crate::dataset;
 use crate::evaluation::{Evaluation, TrialLine};
 use crate::exploration::failures;
@@ -10,8 +11,8 @@ use crate::learning::{curves, json_lines, load};
 use crate::output::write_whole;
 use crate::provenance::RunInfo;
 use crate::report::{
-    Cell, ContactMapFigure, ExplorationRound, ExplorationSummary, LatentMap, Provenance, ReportData, RolloutFigure,
-    ThresholdPoint, TrainingCurve, TrainingEpoch, render,
+    Cell, ContactMapFigure, ExplorationRound, ExplorationSummary, Provenance, ReportData, RolloutFigure, ThresholdPoint,
+    TrainingCurve, TrainingEpoch, render,
 };
 use crate::results::{Method, Results};
 use anyhow::Context;
@@ -20,13 +21,10 @@ use std::path::{Path, PathBuf};
 use vmao_core::catalogue::InstanceSet;
 use vmao_core::order::GraspOrder;
 use vmao_core::outcome::{FailureStage, TrialOutcome};
-use vmao_core::random::Stream;
 use vmao_sim::Recording;
 
-/// Names the stream of the latent codes that are shown.
-const SHOWN_LATENTS: u64 = 1 << 35;
 /// Latent codes shown for each scene, as in the supplement's Figure 4.
-const LATENTS_SHOWN: usize = 5;
+const LATENTS_SHOWN: u64 = 5;
 
 /// Writes `report.html` into a run directory and returns its path.
 pub fn write_report(directory: &Path) -> Result<PathBuf, Failure> {
@@ -38,7 +36,7 @@ pub fn write_report(directory: &Path) -> Result<PathBuf, Failure> {
     let mut methods = Vec::new();
     for method in [Method::Vmao, Method::Top1] {
         if models.join(method.name()).is_dir() {
-            methods.push(load(&models.join(method.name()), config.robots.names.len())?);
+            methods.push(load(&models.join(method.name()), crate::scenes::grasps(&config)?)?);
         }
     }
     let evaluation = Evaluation::new(&config, info.seed, methods)?;
@@ -109,22 +107,9 @@ fn contact_maps(evaluation: &Evaluation<'_>, lines: &[TrialLine], seed: u64) -> 
         let Some((grasp, second)) = trial.as_ref().and_then(|trial| trial.record.grasps.iter().enumerate().nth(1)) else {
             continue;
         };
-        let seen = &second.observation;
-        let scene = model.networks[grasp].encode(&seen.points, &seen.colors)?;
-        let mut maps = Vec::new();
-        for shown in 0..LATENTS_SHOWN {
-            let latent = model.latent(grasp, &mut Stream::new(seed, &[SHOWN_LATENTS, shown as u64]));
-            let [finger1, finger2] = model.networks[grasp].decode(&scene, &latent)?.fingers;
-            maps.push(LatentMap { latent, finger1, finger2 });
-        }
-        figures.push(ContactMapFigure {
-            title: title.to_owned(),
-            caption: format!("Trial {}. {caption}", line.index),
-            points: seen.points.clone(),
-            colors: seen.colors.clone(),
-            labels: seen.labels.clone(),
-            maps,
-        });
+        let maps = latent_maps(model, grasp, &second.observation, seed, LATENTS_SHOWN)?;
+        let caption = format!("Trial {}. {caption}", line.index);
+        figures.push(ContactMapFigure::new(title.to_owned(), caption, &second.observation, maps));
     }
     Ok(figures)
 }

@@ -39,7 +39,7 @@ pub(super) fn run(_arguments: &DemoArguments, mut session: Session) -> Result<()
         for &method in &config.evaluate.methods {
             let place = directory.join("models").join(method.name());
             train_all(config, method, &records, seed, &place)?;
-            models.push(load(&place, config.robots.names.len())?);
+            models.push(load(&place, crate::scenes::grasps(&session.config)?)?);
         }
         let results = table(&session, models, &directory)?;
         Ok((results, write_report(&directory)?))
