@@ -106,15 +106,14 @@ fn contact_maps(evaluation: &Evaluation<'_>, lines: &[TrialLine], seed: u64) -> 
         let is_shown = |line: &&TrialLine| line.order == order && line.method == Method::Vmao && line.outcome.is_success();
         let Some(line) = lines.iter().find(is_shown) else { continue };
         let trial = evaluation.trial(order, Method::Vmao, line.index, Recording::Off);
-        let Some((grasp, second)) = trial.as_ref().and_then(|trial| trial.record.grasps.iter().enumerate().nth(1)) else {
-            continue;
-        };
+        let Some(second) = trial.as_ref().and_then(|trial| trial.record.grasps.get(1)) else { continue };
+        let part = usize::from(second.contact.part.0);
         let seen = &second.observation;
-        let scene = model.networks[grasp].encode(&seen.points, &seen.colors)?;
+        let scene = model.networks[part].encode(&seen.points, &seen.colors)?;
         let mut maps = Vec::new();
         for shown in 0..LATENTS_SHOWN {
-            let latent = model.latent(grasp, &mut Stream::new(seed, &[SHOWN_LATENTS, shown as u64]));
-            let [finger1, finger2] = model.networks[grasp].decode(&scene, &latent)?.fingers;
+            let latent = model.latent(part, &mut Stream::new(seed, &[SHOWN_LATENTS, shown as u64]));
+            let [finger1, finger2] = model.networks[part].decode(&scene, &latent)?.fingers;
             maps.push(LatentMap { latent, finger1, finger2 });
         }
         figures.push(ContactMapFigure {
