@@ -49,7 +49,9 @@ pub enum HullError {
         count: usize,
     },
     /// A hole, or faces that turn against their neighbours, or more than two at one edge.
-    #[error("the edge from vertex {from} to {to} is not shared by two faces with the same sense of turn, expected a closed surface")]
+    #[error(
+        "the edge from vertex {from} to {to} is not shared by two faces with the same sense of turn, expected a closed surface"
+    )]
     Open {
         /// The edge's start in the walk around one face.
         from: u32,
@@ -57,7 +59,9 @@ pub enum HullError {
         to: u32,
     },
     /// Several surfaces, a surface with handles, or vertices that no face uses.
-    #[error("{vertices} vertices and {faces} faces, expected one surface like a ball's with every vertex used: 2·vertices − 4 faces")]
+    #[error(
+        "{vertices} vertices and {faces} faces, expected one surface like a ball's with every vertex used: 2·vertices − 4 faces"
+    )]
     Topology {
         /// Number of vertices.
         vertices: usize,
@@ -308,9 +312,7 @@ impl Capsule {
         let axis = turn * Vector3::ith(extent.imax(), 1.0);
         let across = |offset: &Vector3<f64>| (offset - axis * offset.dot(&axis)).norm();
         let girth = offsets().map(|offset| across(&offset)).fold(0.0, f64::max);
-        let beyond = |offset: Vector3<f64>| {
-            offset.dot(&axis).abs() - (girth * girth - across(&offset).powi(2)).max(0.0).sqrt()
-        };
+        let beyond = |offset: Vector3<f64>| offset.dot(&axis).abs() - (girth * girth - across(&offset).powi(2)).max(0.0).sqrt();
         let half = offsets().map(beyond).fold(0.0, f64::max);
         let bound = offsets().map(|offset| offset.norm()).fold(0.0, f64::max);
         Self { middle, spine: axis * half, girth, bound }

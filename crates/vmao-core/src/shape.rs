@@ -99,9 +99,7 @@ impl Shape {
         let ball = |radius: f64| direction.try_normalize(0.0).map_or_else(Vector3::zeros, |unit| unit * radius);
         match *self {
             Self::Sphere { radius } => Point3::from(ball(radius)),
-            Self::Capsule { radius, half_length } => {
-                Point3::from(ball(radius) + Vector3::z() * along(half_length, direction.z))
-            }
+            Self::Capsule { radius, half_length } => Point3::from(ball(radius) + Vector3::z() * along(half_length, direction.z)),
             Self::Cylinder { radius, half_length } => {
                 let flat = direction.xy().try_normalize(0.0).unwrap_or_default() * radius;
                 Point3::new(flat.x, flat.y, along(half_length, direction.z))

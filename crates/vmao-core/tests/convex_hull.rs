@@ -102,7 +102,8 @@ fn the_inertia_of_primitives_is_that_of_points_spread_in_them() {
     ] {
         let solid = Convex::new(&shape, &Pose::identity());
         let (mut sum, mut count) = (Matrix3::zeros(), 0.0);
-        let size = [Vector3::x(), Vector3::y(), Vector3::z()].map(|axis| shape.extent_along(&axis).max(shape.extent_along(&-axis)));
+        let size =
+            [Vector3::x(), Vector3::y(), Vector3::z()].map(|axis| shape.extent_along(&axis).max(shape.extent_along(&-axis)));
         while count < 40_000.0 {
             let point = Vector3::from(size.map(|half| stream.range(-half, half)));
             let dot = Convex::new(&Shape::Sphere { radius: 0.0 }, &translation(point.x, point.y, point.z));
@@ -139,9 +140,8 @@ fn hulls_around_points_hold_them_all_or_those_that_matter() {
         assert!(coarse.volume() < whole.volume() && coarse.volume() > 0.6 * whole.volume(), "{seed}");
     }
     // A lattice: faces full of points in one plane and edges full of points in one line.
-    let lattice: Vec<Point3<f64>> = (0..125)
-        .map(|i| Point3::new(f64::from(i % 5) * 0.01, f64::from(i / 5 % 5) * 0.02, f64::from(i / 25) * 0.03))
-        .collect();
+    let lattice: Vec<Point3<f64>> =
+        (0..125).map(|i| Point3::new(f64::from(i % 5) * 0.01, f64::from(i / 5 % 5) * 0.02, f64::from(i / 25) * 0.03)).collect();
     let corners = ConvexHull::around(&lattice, MAX_VERTICES).unwrap();
     assert_eq!((corners.vertices().len(), corners.faces().len()), (8, 12));
     assert!((corners.volume() - 0.04 * 0.08 * 0.12).abs() < 1e-12);

@@ -10,6 +10,7 @@ mod cameras;
 mod carrying;
 mod combinations;
 mod convention;
+mod dependency_root;
 mod error;
 mod execution;
 mod exploration;
@@ -34,6 +35,7 @@ pub mod tracking;
 mod trial;
 
 pub use cameras::CameraConfig;
+pub use dependency_root::{PredictedMotion, Root, predict};
 pub use error::Error;
 pub use execution::MotionConfig;
 pub use exploration::{LabelSet, Proposals, explore_round, scene_of_trial};

@@ -10,20 +10,20 @@ use vmao_core::random::Stream;
 /// Names the stream of the latent codes that are shown.
 const SHOWN_LATENTS: u64 = 1 << 35;
 
-/// The maps of `codes` latent codes on one observation.
+/// The maps of `codes` latent codes for `part` on one observation.
 ///
 /// The seed decides the codes, so that code 2 of one scene can be compared with code 2 of another (supplement, Figure 4).
 pub(crate) fn latent_maps(
     model: &LearnedContacts,
-    grasp: usize,
+    part: usize,
     seen: &Observation,
     seed: u64,
     codes: u64,
 ) -> Result<Vec<LatentMap>, Failure> {
-    let network = &model.networks[grasp];
+    let network = &model.networks[part];
     let scene = network.encode(&seen.points, &seen.colors)?;
     let map = |code| {
-        let latent = model.latent(grasp, &mut Stream::new(seed, &[SHOWN_LATENTS, code]));
+        let latent = model.latent(part, &mut Stream::new(seed, &[SHOWN_LATENTS, code]));
         let [finger1, finger2] = network.decode(&scene, &latent)?.fingers;
         Ok(LatentMap { latent, finger1, finger2 })
     };

@@ -1,4 +1,4 @@
-//! From a data set to checkpoints: one network for each grasp step.
+//! From a data set to checkpoints: one network for each part, `grasp-0` for the object's first and so on.
 
 use crate::config::Config;
 use crate::failure::{Failure, OrBadInput};
@@ -47,11 +47,11 @@ pub fn model_kind(method: Method) -> ModelKind {
     }
 }
 
-/// The training examples of grasp step `grasp`: what was seen before the successful grasps, and where they touched.
-pub fn examples(records: &[TrialRecord], grasp: usize) -> Vec<Example> {
+/// The training examples of `part`: what was seen before the successful grasps of it, and where they touched.
+pub fn examples(records: &[TrialRecord], part: usize) -> Vec<Example> {
     let successes = records.iter().filter(|record| record.outcome.is_success());
     successes
-        .filter_map(|record| record.grasps.get(grasp))
+        .flat_map(|record| record.grasps.iter().filter(|grasp| usize::from(grasp.contact.part.0) == part))
         .map(|grasp| Example {
             points: grasp.observation.points.clone(),
             colors: grasp.observation.colors.clone(),

@@ -104,10 +104,9 @@ fn contact_maps(evaluation: &Evaluation<'_>, lines: &[TrialLine], seed: u64) -> 
         let is_shown = |line: &&TrialLine| line.order == order && line.method == Method::Vmao && line.outcome.is_success();
         let Some(line) = lines.iter().find(is_shown) else { continue };
         let trial = evaluation.trial(order, Method::Vmao, line.index, Recording::Off);
-        let Some((grasp, second)) = trial.as_ref().and_then(|trial| trial.record.grasps.iter().enumerate().nth(1)) else {
-            continue;
-        };
-        let maps = latent_maps(model, grasp, &second.observation, seed, LATENTS_SHOWN)?;
+        let Some(second) = trial.as_ref().and_then(|trial| trial.record.grasps.get(1)) else { continue };
+        let part = usize::from(second.contact.part.0);
+        let maps = latent_maps(model, part, &second.observation, seed, LATENTS_SHOWN)?;
         let caption = format!("Trial {}. {caption}", line.index);
         figures.push(ContactMapFigure::new(title.to_owned(), caption, &second.observation, maps));
     }

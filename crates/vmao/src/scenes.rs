@@ -34,10 +34,11 @@ pub fn scenes(config: &Config, set: InstanceSet) -> Result<Vec<Scene>, Failure> 
             let message = format!("robots.names: {arms} arms, expected at least {parts}: one for each part of `{object}`");
             return Err(Failure::bad_input(message));
         }
-        Scene::new(&config.scene, robots.clone(), item).map_err(|error| match error {
+        let scene = Scene::new(&config.scene, robots.clone(), item).map_err(|error| match error {
             Error::Placement { cause } => Failure::bad_input(format!("scene.layout: {cause}")),
             other => other.into(),
-        })
+        })?;
+        scene.with_root(&config.object.root).map_err(|error| Failure::bad_input(format!("object.root: {error}")))
     };
     items(config, set)?.into_iter().map(compile).collect()
 }

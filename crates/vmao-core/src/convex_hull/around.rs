@@ -71,8 +71,7 @@ fn grow(points: &[Point3<f64>], most: usize, thin: f64) -> Option<Vec<Face>> {
         };
         let best = faces.iter().filter_map(furthest).reduce(|best, next| if next.0 > best.0 { next } else { best });
         let Some((_, apex)) = best else { break };
-        let (seen, mut kept): (Vec<Face>, Vec<Face>) =
-            faces.into_iter().partition(|face| face.height(&points[apex]) > thin);
+        let (seen, mut kept): (Vec<Face>, Vec<Face>) = faces.into_iter().partition(|face| face.height(&points[apex]) > thin);
         let walks: Vec<(usize, usize)> = seen.iter().flat_map(Face::walks).collect();
         let orphans = seen.iter().flat_map(|face| &face.outside).copied().filter(|&point| point != apex).collect();
         let first = kept.len();

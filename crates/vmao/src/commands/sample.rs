@@ -60,8 +60,9 @@ pub(super) fn run(arguments: &SampleArguments, session: &Session) -> Result<(), 
         }
         let Some(seen) = session.pool()?.install(|| look(&evaluation, method, order, index, grasp)) else { continue };
         let model = evaluation.model(method).context("the model is in the table")?;
-        let codes = if model.networks[grasp].latent_size() == 0 { 1 } else { arguments.samples };
-        let sampled = latent_maps(model, grasp, &seen.observation, session.info.seed, codes)?;
+        let part = usize::from(seen.contact.part.0);
+        let codes = if model.networks[part].latent_size() == 0 { 1 } else { arguments.samples };
+        let sampled = latent_maps(model, part, &seen.observation, session.info.seed, codes)?;
         for (number, map) in sampled.iter().enumerate() {
             let path = maps.join(format!("scene-{index}-grasp-{}-code-{number}.ply", arguments.grasp));
             write_whole(&path, |file| ply(file, &seen.observation, map)).with_context(|| path.display().to_string())?;
