@@ -6,6 +6,7 @@ extern crate self as vmao_sim;
 
 mod assignment;
 mod attempt;
+mod bodies;
 mod cameras;
 mod carrying;
 mod combinations;
@@ -32,6 +33,7 @@ mod tests;
 pub mod throughput;
 pub mod tracking;
 mod trial;
+mod viewpoints;
 
 pub use cameras::CameraConfig;
 pub use error::Error;
@@ -46,3 +48,4 @@ pub use portrait::{Picture, portrait};
 pub use scene::{Friction, Scene, SceneConfig};
 pub use task::{GoalConfig, StartConfig, Thresholds};
 pub use trial::{Recording, Trial, TrialConfig, run_trial};
+pub use viewpoints::Viewpoint;
