@@ -49,7 +49,7 @@ pub struct CameraConfig {
 /// Points up to this height count as the table's plane when the cloud is thinned (m); geometry only, no labels.
 pub(crate) const TABLE_PLANE_HEIGHT: f64 = 0.002;
 
-struct Seen {
+pub(crate) struct Seen {
     position: [f32; 3],
     color: [f32; 3],
     label: PointLabel,
@@ -101,6 +101,7 @@ fn shares(config: &CameraConfig, seen: [usize; 3]) -> [usize; 3] {
 }
 
 /// All that rays can meet, where it is now.
+#[derive(Debug)]
 pub(crate) struct Visible {
     /// What it belongs to, and the solid in the world's frame.
     solids: Vec<(PointLabel, Solid)>,
@@ -134,7 +135,7 @@ impl Visible {
     }
 
     /// The points of the workspace that `camera` sees, row by row.
-    fn points(&self, camera: &Pinhole, config: &CameraConfig, noise_stream: &mut Stream) -> Vec<Seen> {
+    pub(crate) fn points(&self, camera: &Pinhole, config: &CameraConfig, noise_stream: &mut Stream) -> Vec<Seen> {
         let picture = self.picture(camera, config);
         let eye = camera.world_from_camera.translation.vector;
         let noise = Some(&config.noise).filter(|noise| !noise.is_off());

@@ -19,6 +19,7 @@ mod grasping;
 mod judge;
 mod layout;
 mod link_meshes;
+pub mod looking;
 mod measures;
 mod mjcf;
 mod planning_world;
