@@ -11,6 +11,10 @@ use vmao_core::object::{ArticulatedObject, Joint, JointKind};
 use vmao_core::robots::{Gripper, Link, RobotModel};
 use vmao_core::shape::Solid;
 
+/// Half the table's edges along x and y (m), and its colour.
+pub(crate) const TABLE_HALF_WIDTHS: [f64; 2] = [1.0, 0.8];
+pub(crate) const TABLE_COLOR: [f32; 3] = [0.82, 0.78, 0.72];
+
 /// Name of the body of an object part.
 pub(crate) fn part_name(part: &str) -> String {
     format!("object/{part}")
@@ -34,10 +38,11 @@ pub(crate) fn scene(
     xml.push_str(&link_meshes::assets(meshes));
     line(&mut xml, "<worldbody>");
     line(&mut xml, r#"<light pos="0 0 2.5" dir="0 0 -1" diffuse="0.7 0.7 0.7"/>"#);
+    let ([x, y], [r, g, b]) = (TABLE_HALF_WIDTHS, TABLE_COLOR);
     line(
         &mut xml,
         &format!(
-            r#"<geom name="table" type="plane" size="1 0.8 0.05" rgba="0.82 0.78 0.72 1" friction="{}"/>"#,
+            r#"<geom name="table" type="plane" size="{x} {y} 0.05" rgba="{r} {g} {b} 1" friction="{}"/>"#,
             config.table_friction.mjcf()
         ),
     );
