@@ -34,7 +34,8 @@ fn main() -> Result<(), Box<dyn Error>> {
     };
     let trial = TrialConfig { cameras, ..trial };
     let item = item(object, InstanceSet::Train, 0).ok_or("no such object in the catalogue")?;
-    let middles: Vec<f64> = item.object.joints.iter().filter_map(|joint| joint.limits.map(|[a, b]| f64::midpoint(a, b))).collect();
+    let middles: Vec<f64> =
+        item.object.joints.iter().filter_map(|joint| joint.limits.map(|[a, b]| f64::midpoint(a, b))).collect();
     let scene = Scene::new(&scene, vec![panda(), panda()], item)?;
     let still = Still::new(&scene, &trial, &Pose::translation(0.02, -0.01, 0.15), &middles);
     std::fs::write(Path::new(folder).join("scene.xml"), &scene.mjcf)?;

@@ -4,7 +4,6 @@ use crate::config::Config;
 use crate::contact_maps::latent_maps;
 use crate::dataset;
 use crate::evaluation::{Evaluation, TrialLine};
-use crate::exploration::failures;
 use crate::failure::{Failure, OrBadInput};
 use crate::json::Document;
 use crate::learning::{curves, json_lines, load};
@@ -16,11 +15,12 @@ use crate::report::{
 };
 use crate::results::{Method, Results};
 use anyhow::Context;
+use std::collections::BTreeMap;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 use vmao_core::catalogue::InstanceSet;
 use vmao_core::order::GraspOrder;
-use vmao_core::outcome::{FailureStage, TrialOutcome};
+use vmao_core::outcome::TrialOutcome;
 use vmao_sim::Recording;
 
 /// Latent codes shown for each scene, as in the supplement's Figure 4.
@@ -158,25 +158,27 @@ fn explored(config: &Config, directory: &Path) -> Result<(Option<ExplorationSumm
     if !directory.is_dir() {
         return Ok((None, String::new()));
     }
-    let mut rounds = Vec::new();
-    let mut records = Vec::new();
-    for shard in dataset::shards(directory).or_bad_input()? {
-        let round = dataset::read_shard(&shard).or_bad_input()?;
+    let (mut rounds, mut failures) = (Vec::new(), BTreeMap::new());
+    let mut trials = 0;
+    for round in dataset::rounds(directory).or_bad_input()? {
+        let round = round.or_bad_input()?;
         let successes = round.iter().filter(|record| record.outcome.is_success()).count() as u64;
         rounds.push(ExplorationRound { trials: round.len() as u64, successes });
-        records.extend(round);
+        trials += round.len() as u64;
+        for record in &round {
+            if let TrialOutcome::Failed(stage) = record.outcome {
+                *failures.entry(stage).or_default() += 1;
+            }
+        }
     }
     let demonstrations =
         crate::scenes::items(config, InstanceSet::Train)?.iter().map(|item| item.demonstrations.len() as u64).max();
     let summary = ExplorationSummary {
-        trials: records.len() as u64,
+        trials,
         successes: rounds.iter().map(|round| round.successes).sum(),
         demonstrations: demonstrations.unwrap_or(0),
-        failures: failures(&records)
-            .into_iter()
-            .filter(|(_, count)| *count > 0)
-            .collect::<std::collections::BTreeMap<FailureStage, u64>>(),
+        failures,
         rounds,
     };
-    Ok((Some(summary), dataset::digest(&records)))
+    Ok((Some(summary), dataset::digest_of(directory).or_bad_input()?))
 }

@@ -70,7 +70,7 @@ fn an_exploration_that_is_resumed_ends_with_the_digest_of_an_undisturbed_one() {
     };
     let whole = explore("whole", &[]);
     assert_eq!(explore("torn", &[]), whole);
-    // What a kill during the last round leaves: its shard missing, a partial file beside.
+    // What a kill during the last round leaves: its file missing, a partial file beside.
     let torn = directory.path().join("torn");
     fs::rename(torn.join("trials-00000008-00000011.parquet"), torn.join(".trials-00000008-00000011.parquet.partial")).unwrap();
     assert_eq!(explore("torn", &["--resume"]), whole);
