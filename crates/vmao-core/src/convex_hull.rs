@@ -4,7 +4,7 @@ mod around;
 mod measure;
 
 use measure::Measures;
-use nalgebra::{Matrix3, Point3, UnitQuaternion, Vector3};
+use nalgebra::{Matrix3, Point3, Rotation3, Vector3};
 use serde::{Deserialize, Serialize};
 use std::{fmt, sync::Arc};
 use thiserror::Error;
@@ -302,8 +302,9 @@ fn furthest(vertices: &[Point3<f64>], direction: &Vector3<f64>) -> (usize, f64) 
 impl Capsule {
     /// Along the direction in which the mass is drawn out the most.
     fn around(vertices: &[Point3<f64>], measures: &Measures) -> Self {
-        let axes = measures.inertia.symmetric_eigen();
-        let turn = UnitQuaternion::from_matrix(&axes.eigenvectors);
+        let axes = measures.inertia.symmetric_eigen().eigenvectors;
+        let (x, y) = (axes.column(0).into_owned(), axes.column(1).into_owned());
+        let turn = Rotation3::from_basis_unchecked(&[x, y, x.cross(&y)]);
         let local: Vec<Point3<f64>> = vertices.iter().map(|vertex| turn.inverse() * vertex).collect();
         let (low, high) = measure::corners(&local);
         let middle = turn * ((low + high) / 2.0);

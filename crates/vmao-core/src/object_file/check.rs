@@ -38,7 +38,7 @@ impl Place {
 
     /// Refuses a number outside `[low, high]`, and one that is no number.
     fn within(&self, value: f64, [low, high]: [f64; 2]) -> Result<(), ObjectFileError> {
-        self.ensure(value >= low && value <= high, || format!("{value}, expected a number from {low} to {high}"))
+        self.ensure(value >= low && value <= high, || format!("{value:?}, expected a number from {low} to {high}"))
     }
 
     fn vector(&self, values: &[f64; 3]) -> Result<(), ObjectFileError> {
@@ -196,10 +196,12 @@ fn joint(place: &Place, entry: &JointEntry, parts: &[Part]) -> Result<Joint, Obj
         let limits = place.key("limits");
         limits.at(0).within(low, [-LARGEST, LARGEST])?;
         limits.at(1).within(high, [-LARGEST, LARGEST])?;
-        limits.ensure(low < high, || format!("[{low}, {high}], expected [low, high] with low < high"))?;
+        limits.ensure(low < high, || format!("[{low:?}, {high:?}], expected [low, high] with low < high"))?;
         let from_zero = entry.kind != JointKind::Ball || low == 0.0;
         limits.ensure(low <= 0.0 && high >= 0.0 && from_zero, || {
-            format!("[{low}, {high}] without zero, at which the parts are drawn; expected low ≤ 0 ≤ high (a ball: [0, angle])")
+            format!(
+                "[{low:?}, {high:?}] without zero, at which the parts are drawn; expected low ≤ 0 ≤ high (a ball: [0, angle])"
+            )
         })?;
     }
     place.key("damping").within(entry.damping, [0.0, LARGEST])?;
