@@ -17,7 +17,7 @@ use crate::trial::{Recording, Trial, TrialConfig};
 use nalgebra::Point3;
 use std::ops::Range;
 use vmao_core::contact::{ArmId, Contact, PartId};
-use vmao_core::contact_model::{ContactModel, ContactQuery};
+use vmao_core::contact_model::{ContactModel, ContactQuery, FingerPoints};
 use vmao_core::geometry::{Pose, interpolate};
 use vmao_core::object::{ObjectGoal, ObjectState};
 use vmao_core::object_centric::part_poses;
@@ -31,7 +31,7 @@ use vmao_core::time_parameterization::{MotionLimits, Trajectory};
 
 /// Random streams of a trial, each its own so that two methods meet the same scene and goal.
 #[derive(Clone, Copy)]
-enum Draw {
+pub(crate) enum Draw {
     Start = 0,
     Goal,
     Look,
@@ -65,14 +65,14 @@ pub(crate) struct Attempt<'a> {
     seed: u64,
     index: u64,
     /// The parts in the order in which they are grasped.
-    sequence: Vec<PartId>,
+    pub(crate) sequence: Vec<PartId>,
     /// Which arm grasps each part.
-    arms: Vec<ArmId>,
+    pub(crate) arms: Vec<ArmId>,
     start: ObjectState,
     pub(crate) goal: ObjectGoal,
     pub(crate) goal_parts: Vec<Pose>,
     pub(crate) held: Vec<(ArmId, PartId)>,
-    grasps: Vec<GraspRecord>,
+    pub(crate) grasps: Vec<GraspRecord>,
     pub(crate) errors: [f64; 4],
     /// Worst ratio of error to threshold while the goal was to be held.
     pub(crate) factor: f64,
@@ -138,7 +138,7 @@ impl<'a> Attempt<'a> {
         self.scene.object.parts.len()
     }
 
-    fn stream(&self, draw: Draw) -> Stream {
+    pub(crate) fn stream(&self, draw: Draw) -> Stream {
         Stream::new(self.seed, &[self.index, draw as u64, self.held.len() as u64])
     }
 
@@ -160,7 +160,7 @@ impl<'a> Attempt<'a> {
         &mut self,
         model: &dyn ContactModel,
         step: Range<usize>,
-    ) -> Result<Vec<[Point3<f64>; 2]>, Failure> {
+    ) -> Result<Vec<Vec<FingerPoints>>, Failure> {
         let mut stream = self.stream(Draw::Look);
         let held = self.held.len() as u64;
         let noise = |camera| Stream::new(self.seed, &[self.index, Draw::Noise as u64, held, camera as u64]);
@@ -172,10 +172,13 @@ impl<'a> Attempt<'a> {
             let world_from_part = state.world_from_parts[usize::from(part.0)];
             let query = ContactQuery { grasp, part, observation: &observation, world_from_part: &world_from_part };
             let mut stream = Stream::new(self.seed, &[self.index, Draw::Contacts as u64, grasp as u64]);
-            let fingers = time(Stage::Proposal, || model.propose(&query, &mut stream))
-                .ok_or_else(|| Failure::new(FailureStage::NoContact, format!("nothing to touch was seen on part {}", part.0)))?;
-            if fingers.iter().flat_map(|point| point.iter()).any(|value| !value.is_finite()) {
-                let why = format!("the points proposed on part {} are not finite: {} and {}", part.0, fingers[0], fingers[1]);
+            let proposals = time(Stage::Proposal, || model.propose(&query, &mut stream));
+            let Some(&fingers) = proposals.first() else {
+                let why = format!("nothing to touch was seen on part {}", part.0);
+                return Err(Failure::new(FailureStage::NoContact, why));
+            };
+            if let Some(odd) = proposals.iter().find(|fingers| fingers.iter().flat_map(|p| p.iter()).any(|x| !x.is_finite())) {
+                let why = format!("the points proposed on part {} are not finite: {} and {}", part.0, odd[0], odd[1]);
                 return Err(Failure::new(FailureStage::NoContact, why));
             }
             let contact = Contact { part, fingers: fingers.map(|point| world_from_part.inverse_transform_point(&point)) };
@@ -185,7 +188,7 @@ impl<'a> Attempt<'a> {
             if let Some(recorder) = &mut self.simulation.recorder {
                 recorder.contact(steps, arm.0, &fingers);
             }
-            contacts.push(fingers);
+            contacts.push(proposals);
         }
         Ok(contacts)
     }
@@ -193,7 +196,7 @@ impl<'a> Attempt<'a> {
     /// Gripper poses for these contacts that all arms reach, carry to the step's goal, and take without meeting; best first.
     ///
     /// Arms are assigned to parts by distance; the other way round only if that leaves no way, now or for later grasps.
-    pub(crate) fn choose_grasps(&mut self, contacts: &[[Point3<f64>; 2]]) -> Result<Vec<Vec<Grasp>>, Failure> {
+    pub(crate) fn choose_grasps(&mut self, contacts: &[FingerPoints]) -> Result<Vec<Vec<Grasp>>, Failure> {
         let mut stream = self.stream(Draw::Reach);
         let now = self.simulation.object_state().world_from_parts;
         let mut crowded = Err(Failure::new(FailureStage::NoPlan, "no arm is free"));
@@ -209,20 +212,29 @@ impl<'a> Attempt<'a> {
     }
 
     /// The combinations of grasps on these contacts that the arms can make if part p is taken by `arms[p]`.
-    fn choices(&self, arms: &[ArmId], contacts: &[[Point3<f64>; 2]], stream: &mut Stream) -> Result<Choices, Failure> {
+    fn choices(&self, arms: &[ArmId], contacts: &[FingerPoints], stream: &mut Stream) -> Result<Choices, Failure> {
         let (first, config) = (self.held.len(), &self.config.grasp);
         let cloud = object_cloud(&self.grasps[first].observation);
         let holders = self.holders();
         let motion = self.waypoints(&self.trajectory(self.step_goal(first + contacts.len())));
         let mut candidates = Vec::new();
-        for (grasp, fingers) in contacts.iter().enumerate() {
-            let part = self.sequence[first + grasp];
-            let arm = arms[usize::from(part.0)];
-            let reached = reachable_grasps(&self.simulation, config, (arm, part), (&cloud, fingers), &motion, stream)?;
-            candidates.push(free_alone(&self.simulation, config, &holders, &motion[0], reached));
+        for (&part, fingers) in self.sequence[first..].iter().zip(contacts) {
+            candidates.push(self.within_reach((arms[usize::from(part.0)], part), (&cloud, fingers), &motion, stream)?);
         }
         let reserve = self.reserve(arms, first + contacts.len(), &motion, stream);
         compatible_grasps(&self.simulation, config, &candidates, &holders, &reserve)
+    }
+
+    /// The grasps of `part` at these points that `arm` can make and carry as far as it alone is concerned.
+    pub(crate) fn within_reach(
+        &self,
+        (arm, part): (ArmId, PartId),
+        touch: (&[Point3<f64>], &FingerPoints),
+        motion: &[Vec<Pose>],
+        stream: &mut Stream,
+    ) -> Result<Vec<Grasp>, Failure> {
+        let reached = reachable_grasps(&self.simulation, &self.config.grasp, (arm, part), touch, motion, stream)?;
+        Ok(free_alone(&self.simulation, &self.config.grasp, &self.holders(), &motion[0], reached))
     }
 
     /// How the parts that are grasped from `next` on could be taken where the object is after `motion`: as demonstrated, on average.

@@ -26,6 +26,7 @@ mod mjcf;
 mod planning_world;
 mod portrait;
 pub mod profile;
+mod proposals;
 mod recorder;
 mod scene;
 mod simulation;

@@ -78,9 +78,8 @@ pub fn run_trial(
 
 fn manipulate(attempt: &mut Attempt<'_>, model: &dyn ContactModel, order: GraspOrder) -> Result<(), Failure> {
     for step in order.steps(attempt.part_count()) {
-        let contacts = attempt.propose_contacts(model, step)?;
-        let choices = attempt.choose_grasps(&contacts)?;
-        let (grasps, approach) = attempt.plan_approach(choices)?;
+        let proposals = attempt.propose_contacts(model, step)?;
+        let (grasps, approach) = attempt.first_feasible(&proposals)?;
         attempt.approach(&grasps, &approach)?;
         attempt.take_hold(&grasps)?;
         attempt.move_object()?;

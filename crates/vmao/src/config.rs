@@ -120,6 +120,8 @@ pub struct EvaluateConfig {
     pub instances: InstanceSet,
     /// The methods compared.
     pub methods: Vec<Method>,
+    /// K, latent codes that best-of-K draws for each grasp.
+    pub best_of: usize,
 }
 
 impl Config {
@@ -220,6 +222,7 @@ impl Config {
         at_least_one("evaluate.trials", evaluate.trials)?;
         ensure(!evaluate.orders.is_empty(), "evaluate.orders", "no orders", "at least one")?;
         ensure(!evaluate.methods.is_empty(), "evaluate.methods", "no methods", "at least one")?;
+        ensure((1..=1000).contains(&evaluate.best_of), "evaluate.best_of", &evaluate.best_of.to_string(), "1 to 1000")?;
         self.network.validate().map_err(|error| format!("network: {error}"))?;
         self.train.validate().map_err(|error| format!("train: {error}"))
     }

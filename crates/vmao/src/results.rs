@@ -7,6 +7,7 @@ use vmao_core::{
     order::GraspOrder,
     outcome::{FailureStage, TrialOutcome},
 };
+use vmao_net::ModelKind;
 
 /// Who chooses the contacts.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
@@ -14,6 +15,8 @@ use vmao_core::{
 pub enum Method {
     /// Contacts drawn from the generative model.
     Vmao,
+    /// Contacts drawn several times from the generative model, the most probable that can be made: an addition of ours.
+    BestOfK,
     /// The most probable contacts of the deterministic model.
     Top1,
 }
@@ -23,7 +26,16 @@ impl Method {
     pub fn name(self) -> &'static str {
         match self {
             Self::Vmao => "vmao",
+            Self::BestOfK => "best-of-k",
             Self::Top1 => "top1",
+        }
+    }
+
+    /// The network that it asks.
+    pub fn model(self) -> ModelKind {
+        match self {
+            Self::Vmao | Self::BestOfK => ModelKind::Vmao,
+            Self::Top1 => ModelKind::Top1,
         }
     }
 
@@ -31,6 +43,7 @@ impl Method {
     pub fn title(self) -> &'static str {
         match self {
             Self::Vmao => "V-MAO",
+            Self::BestOfK => "V-MAO best-of-K",
             Self::Top1 => "Top-1",
         }
     }

@@ -2,9 +2,8 @@
 #![allow(dead_code, reason = "each test binary uses its own share of this module")]
 #![allow(clippy::unwrap_used, clippy::panic, reason = "a test that cannot go on has failed")]
 
-use nalgebra::Point3;
 use vmao_core::catalogue::{InstanceSet, item};
-use vmao_core::contact_model::{ContactModel, ContactQuery, FixedTuple};
+use vmao_core::contact_model::{ContactModel, ContactQuery, FingerPoints, FixedTuple};
 use vmao_core::order::GraspOrder;
 use vmao_core::osc::OscGains;
 use vmao_core::outcome::{FailureStage, TrialOutcome};
@@ -97,11 +96,11 @@ pub(crate) fn failed_at(trial: &Trial) -> FailureStage {
 }
 
 /// Proposes the same world points for the grasps of all parts, or nothing.
-pub(crate) struct WorldPoints(pub(crate) Option<[Point3<f64>; 2]>);
+pub(crate) struct WorldPoints(pub(crate) Option<FingerPoints>);
 
 impl ContactModel for WorldPoints {
-    fn propose(&self, _query: &ContactQuery<'_>, _stream: &mut Stream) -> Option<[Point3<f64>; 2]> {
-        self.0
+    fn propose(&self, _query: &ContactQuery<'_>, _stream: &mut Stream) -> Vec<FingerPoints> {
+        self.0.into_iter().collect()
     }
 }
 

@@ -8,9 +8,11 @@ use crate::{
     learning::{load, train_all},
     output::{Layout, log, print},
     run_report::write_report,
+    scenes::grasps,
 };
 use serde::Serialize;
 use std::path::{Path, PathBuf};
+use vmao_net::ModelKind;
 
 #[derive(Debug, clap::Args)]
 pub(super) struct DemoArguments {
@@ -41,12 +43,14 @@ pub(super) fn run(_arguments: &DemoArguments, mut session: Session) -> Result<()
         log(&format!("explored: {} of {} trials accepted", explored.successes, explored.trials));
         let records = dataset::load(&data)?;
         let mut models = Vec::new();
-        for &method in &config.evaluate.methods {
-            let place = directory.join("models").join(method.name());
-            train_all(config, method, &records, seed, &place)?;
-            models.push(load(&place, crate::scenes::grasps(&session.config)?)?);
+        for kind in ModelKind::ALL {
+            if config.evaluate.methods.iter().any(|method| method.model() == kind) {
+                let place = directory.join("models").join(kind.name());
+                train_all(config, kind, &records, seed, &place)?;
+                models.push(load(&place, grasps(config)?)?);
+            }
         }
-        let results = table(&session, models, &directory)?;
+        let results = table(&session, &models, &directory)?;
         Ok((results, write_report(&directory)?))
     })?;
     match session.layout {
