@@ -37,6 +37,7 @@ enum Draw {
     Contacts,
     Reach,
     Plan,
+    Noise,
 }
 
 /// Longest time an object may take to come to rest (s), and the speed below which it rests.
@@ -161,7 +162,9 @@ impl<'a> Attempt<'a> {
         step: Range<usize>,
     ) -> Result<Vec<[Point3<f64>; 2]>, Failure> {
         let mut stream = self.stream(Draw::Look);
-        let observation = time(Stage::Observation, || observe(&mut self.simulation, &self.config.cameras, &mut stream));
+        let held = self.held.len() as u64;
+        let noise = |camera| Stream::new(self.seed, &[self.index, Draw::Noise as u64, held, camera as u64]);
+        let observation = time(Stage::Observation, || observe(&self.simulation, &self.config.cameras, &mut stream, noise));
         let state = self.simulation.object_state();
         let mut contacts = Vec::new();
         for grasp in step {

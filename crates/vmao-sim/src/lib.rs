@@ -6,6 +6,7 @@ extern crate self as vmao_sim;
 
 mod assignment;
 mod attempt;
+mod bodies;
 mod cameras;
 mod carrying;
 mod combinations;
@@ -19,6 +20,7 @@ mod grasping;
 mod judge;
 mod layout;
 mod link_meshes;
+pub mod looking;
 mod measures;
 mod mjcf;
 mod planning_world;
@@ -34,6 +36,7 @@ mod tests;
 pub mod throughput;
 pub mod tracking;
 mod trial;
+mod viewpoints;
 
 pub use cameras::CameraConfig;
 pub use dependency_root::{PredictedMotion, Root, predict};
@@ -49,3 +52,4 @@ pub use portrait::{Picture, portrait};
 pub use scene::{Friction, Scene, SceneConfig};
 pub use task::{GoalConfig, GoalReach, StartConfig, Thresholds};
 pub use trial::{Recording, Trial, TrialConfig, run_trial};
+pub use viewpoints::Viewpoint;

@@ -227,6 +227,14 @@ impl Config {
 
 fn check_cameras(cameras: &CameraConfig) -> Result<(), String> {
     within("cameras.count", cameras.count as f64, 2.0, 16.0)?;
+    ensure(cameras.viewpoints.len() <= 16, "cameras.viewpoints", &cameras.viewpoints.len().to_string(), "at most 16")?;
+    for viewpoint in &cameras.viewpoints {
+        for value in viewpoint.position.into_iter().chain(viewpoint.target) {
+            within("cameras.viewpoints", value, -10.0, 10.0)?;
+        }
+        let away = viewpoint.position.iter().zip(viewpoint.target).map(|(from, to)| (from - to).powi(2)).sum::<f64>().sqrt();
+        ensure(away >= 0.01, "cameras.viewpoints", &format!("a target {away} m from its camera"), "at least 0.01 m")?;
+    }
     within("cameras.width", cameras.width as f64, 16.0, 1024.0)?;
     within("cameras.height", cameras.height as f64, 16.0, 1024.0)?;
     within("cameras.field_of_view_deg", cameras.field_of_view_deg, 1.0, 150.0)?;
@@ -240,7 +248,13 @@ fn check_cameras(cameras: &CameraConfig) -> Result<(), String> {
     within("cameras.points", cameras.points as f64, 64.0, 65_536.0)?;
     within("cameras.table_share + cameras.robot_share", cameras.table_share + cameras.robot_share, 0.0, 1.0)?;
     within("cameras.table_share", cameras.table_share, 0.0, 1.0)?;
-    within("cameras.robot_share", cameras.robot_share, 0.0, 1.0)
+    within("cameras.robot_share", cameras.robot_share, 0.0, 1.0)?;
+    within("cameras.noise.deviation", cameras.noise.deviation, 0.0, 0.1)?;
+    within("cameras.noise.step", cameras.noise.step, 0.0, 0.1)?;
+    within("cameras.noise.dropout", cameras.noise.dropout, 0.0, 1.0)?;
+    within("cameras.noise.grazing_deg", cameras.noise.grazing_deg, 0.0, 90.0)?;
+    within("cameras.noise.edge_dropout", cameras.noise.edge_dropout, 0.0, 1.0)?;
+    within("cameras.noise.edge_step", cameras.noise.edge_step, 1e-4, 1.0)
 }
 
 fn check_control(grasp: &GraspConfig, motion: &MotionConfig, osc: &OscGains) -> Result<(), String> {

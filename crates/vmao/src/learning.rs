@@ -5,6 +5,7 @@ use crate::failure::{Failure, OrBadInput};
 use crate::learned_contacts::LearnedContacts;
 use crate::output::{progress_bar, write_whole};
 use crate::results::Method;
+use crate::scenes::grasps;
 use anyhow::Context;
 use serde::{Deserialize, Serialize};
 use std::fs;
@@ -67,7 +68,7 @@ pub fn train_all(
     seed: u64,
     directory: &Path,
 ) -> Result<Vec<EpochLine>, Failure> {
-    let grasps = config.robots.names.len();
+    let grasps = grasps(config)?;
     let mut lines = Vec::new();
     let bar = progress_bar(&format!("train {}", method.title()), (grasps * config.train.epochs) as u64);
     for grasp in 0..grasps {

@@ -15,6 +15,11 @@ pub fn items(config: &Config, set: InstanceSet) -> Result<Vec<CatalogueItem>, Fa
     (0..INSTANCES).map(|instance| item(instance).ok_or_else(unknown)).collect()
 }
 
+/// Grasps of a trial, one for each part of the configured object; arms beyond them stand by.
+pub fn grasps(config: &Config) -> Result<usize, Failure> {
+    Ok(items(config, InstanceSet::Train)?.iter().map(|item| item.object.parts.len()).max().unwrap_or(0))
+}
+
 /// Compiles the configured scene for every size in `set`. Unknown names and too few or many arms are bad input.
 pub fn scenes(config: &Config, set: InstanceSet) -> Result<Vec<Scene>, Failure> {
     let robot = |name: &String| match name.as_str() {

@@ -14,7 +14,7 @@ use vmao_core::random::Stream;
 use vmao_core::shape::{Shape, Solid};
 
 fn look(simulation: &mut Simulation<'_>, config: &CameraConfig, seed: u64) -> Observation {
-    observe(simulation, config, &mut Stream::new(seed, &[]))
+    observe(simulation, config, &mut Stream::new(seed, &[]), |camera| Stream::new(seed, &[1, camera as u64]))
 }
 
 /// All solids of the scene by what they belong to, with their world poses.

@@ -9,6 +9,7 @@ mod inverse_kinematics;
 mod kinematics;
 mod link_meshes;
 mod object_trees;
+mod rays;
 mod reachability;
 mod starts_and_goals;
 #[path = "../../tests/support/mod.rs"]
