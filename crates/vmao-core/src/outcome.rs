@@ -41,6 +41,19 @@ impl FailureStage {
     }
 }
 
+/// Whether the arms can hold all parts at the start of a trial and at its goal, whoever chooses the contacts.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Default, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Reachability {
+    /// Every part has an arm of its own with joint positions for one grasp at the start and at the goal.
+    Reachable,
+    /// It is proven for every grasp looked at that no choice of arms has joint positions for all parts.
+    Unreachable,
+    /// Neither was found.
+    #[default]
+    Unknown,
+}
+
 /// How a trial ended.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]

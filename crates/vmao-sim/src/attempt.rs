@@ -12,7 +12,7 @@ use crate::profile::{Stage, time};
 use crate::recorder::Recorder;
 use crate::scene::Scene;
 use crate::simulation::{Grip, Simulation};
-use crate::task::{goal_errors, sample_goal, sample_start};
+use crate::task::{GoalReach, draw_goal, goal_errors, sample_start};
 use crate::trial::{Recording, Trial, TrialConfig};
 use nalgebra::Point3;
 use std::ops::Range;
@@ -20,7 +20,6 @@ use vmao_core::contact::{ArmId, Contact, PartId};
 use vmao_core::contact_model::{ContactModel, ContactQuery, FingerPoints};
 use vmao_core::geometry::{Pose, interpolate};
 use vmao_core::object::{ObjectGoal, ObjectState};
-use vmao_core::object_centric::part_poses;
 use vmao_core::object_graph::ObjectGraph;
 use vmao_core::order::GraspOrder;
 use vmao_core::outcome::{FailureStage, TrialOutcome};
@@ -71,6 +70,7 @@ pub(crate) struct Attempt<'a> {
     start: ObjectState,
     pub(crate) goal: ObjectGoal,
     pub(crate) goal_parts: Vec<Pose>,
+    reach: GoalReach,
     pub(crate) held: Vec<(ArmId, PartId)>,
     pub(crate) grasps: Vec<GraspRecord>,
     pub(crate) errors: [f64; 4],
@@ -101,8 +101,7 @@ impl<'a> Attempt<'a> {
         let graph = scene.graph.clone();
         let start = simulation.object_state();
         // Drawn as a motion of part 0 whatever the root, so that all roots meet the same goals.
-        let drawn = sample_goal(scene, &config.goal, &start, &mut draw(Draw::Goal));
-        let goal_parts = part_poses(&scene.object, &graph, drawn.root, &drawn.world_from_root, &drawn.joint_positions);
+        let (drawn, goal_parts, reach) = draw_goal(scene, (&config.goal, &config.grasp), &start, &mut draw(Draw::Goal));
         let root = choose(scene, &config.motion, order, &start, &drawn);
         let goal = drawn.with_root(&scene.object, &graph, root);
         let sequence = grasp_sequence(&graph, goal.root, order);
@@ -125,6 +124,7 @@ impl<'a> Attempt<'a> {
             start,
             goal,
             goal_parts,
+            reach,
             held,
             grasps,
             errors,
@@ -405,6 +405,7 @@ impl<'a> Attempt<'a> {
             threshold_factor: if got_so_far { self.factor } else { f64::INFINITY },
             rollout,
             motion: self.measuring.finish(),
+            reach: self.reach,
         }
     }
 }

@@ -6,14 +6,16 @@ use crate::dependency_root::Root;
 use crate::error::Error;
 use crate::layout::{BasePlacement, Layout, Spacing, base_poses};
 use crate::mjcf;
+use crate::reachability;
 
 use mujoco_rs::wrappers::mj_model::{MjModel, MjtObjBase};
 use nalgebra::{Point3, Vector3};
 use serde::{Deserialize, Serialize};
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 use vmao_core::catalogue::CatalogueItem;
 use vmao_core::contact::{ArmId, ContactTuple, PartId};
 use vmao_core::geometry::{Pose, rotation_exp};
+use vmao_core::inverse_kinematics::InverseKinematics;
 use vmao_core::object::{ArticulatedObject, Joint, JointKind};
 use vmao_core::object_graph::ObjectGraph;
 use vmao_core::osc::{JOINTS, JointLimits, JointVector};
@@ -120,6 +122,8 @@ pub struct Scene {
     /// (qpos address, dof address) of each object joint; none for fixed joints.
     pub(crate) joint_addresses: Vec<Option<(usize, usize)>>,
     pub(crate) owners: Vec<Owner>,
+    /// Made when it is first asked for: most uses of a scene never do.
+    inverse_kinematics: OnceLock<Vec<Arc<InverseKinematics>>>,
 }
 
 impl Scene {
@@ -211,6 +215,7 @@ impl Scene {
             object_dof,
             joint_addresses,
             owners,
+            inverse_kinematics: OnceLock::new(),
         })
     }
 }
@@ -220,6 +225,11 @@ impl Scene {
     pub fn with_root(mut self, name: &str) -> Result<Self, Error> {
         self.root = Root::named(&self.object, name)?;
         Ok(self)
+    }
+
+    /// Inverse kinematics of every arm, for many poses.
+    pub(crate) fn inverse_kinematics(&self) -> &[Arc<InverseKinematics>] {
+        self.inverse_kinematics.get_or_init(|| reachability::prepared(&self.robots))
     }
 
     /// Writes the object's joint positions (rad or m, flat) into the simulator's coordinates.

@@ -8,7 +8,7 @@ use crate::grasping::GraspConfig;
 use crate::measures::MotionMeasures;
 use crate::profile::{self, Stage};
 use crate::scene::Scene;
-use crate::task::{GoalConfig, StartConfig, Thresholds};
+use crate::task::{GoalConfig, GoalReach, StartConfig, Thresholds};
 use serde::{Deserialize, Serialize};
 use vmao_core::contact_model::ContactModel;
 use vmao_core::order::GraspOrder;
@@ -54,6 +54,8 @@ pub struct Trial {
     pub threshold_factor: f64,
     /// How the motions of the object went with all parts held; zeros if it never came to that.
     pub motion: MotionMeasures,
+    /// What was known of its goal before anything moved.
+    pub reach: GoalReach,
     /// Its motion, if asked for.
     pub rollout: Option<Rollout>,
 }

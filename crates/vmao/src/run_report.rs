@@ -71,7 +71,9 @@ fn summary(results: &Results) -> String {
     let cell = |cell: &crate::results::Cell| {
         format!("{} {}: {} of {}", cell.method().title(), cell.order().name(), cell.successes(), cell.trials())
     };
-    format!("Trials that met the goal pose and joint angles. {}.", results.cells.iter().map(cell).collect::<Vec<_>>().join("; "))
+    let cells = results.cells.iter().map(cell).collect::<Vec<_>>().join("; ");
+    let goals = results.goals().map_or_else(String::new, |counts| format!(" Of all, {}.", counts.sentence()));
+    format!("Trials that met the goal pose and joint angles. {cells}.{goals}")
 }
 
 /// The cells of the table, each with its success rate over scaled thresholds.

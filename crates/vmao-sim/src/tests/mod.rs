@@ -10,6 +10,7 @@ mod kinematics;
 mod link_meshes;
 mod object_trees;
 mod rays;
+mod reachability;
 mod starts_and_goals;
 #[path = "../../tests/support/mod.rs"]
 mod support;
