@@ -28,6 +28,7 @@ pub mod profile;
 mod recorder;
 mod scene;
 mod simulation;
+pub mod targets;
 mod task;
 #[cfg(test)]
 mod tests;
