@@ -109,7 +109,7 @@ impl<'a> CollisionChecker<'a> {
             }
             let arm = Arm::new(model, first_joint);
             let riders = local[first_slot..].iter().zip(&carriers[first_slot..]);
-            let riders = riders.filter_map(|(&(_, convex), carrier)| Some((carrier.as_ref()?.1, convex)));
+            let riders = riders.filter_map(|((_, convex), carrier)| Some((carrier.as_ref()?.1, convex)));
             reaches.push(Reaches::new(&arm.parent_from_joints, first_joint, first_slot, riders));
             arms.push(arm);
             first_joint += model.chain.len();
@@ -122,7 +122,7 @@ impl<'a> CollisionChecker<'a> {
         }
         let mut pairs = pairs(world, &local, &balls, frozen);
         let bunches = bunches(&mut pairs, &local, &balls);
-        let placed = local.iter().map(|&(_, convex)| convex).collect();
+        let placed = local.iter().map(|(_, convex)| convex.clone()).collect();
         let centers = local.iter().map(|(_, convex)| *convex.center()).collect();
         let sweep = Sweep::new(reaches, local.len(), &pairs, &bunches, frozen);
         let floor = world.floor_height.unwrap_or(f64::NEG_INFINITY);

@@ -1,7 +1,7 @@
 //! Depth pictures of solids by ray casting: exact surfaces, each solid tried only for the pixels that it can cover.
 
 use crate::geometry::Pose;
-use crate::rays::{Span, ahead, ball, capsule, cuboid, cylinder};
+use crate::rays::{Span, ahead, ball, capsule, cuboid, cylinder, polyhedron};
 use crate::shape::Shape;
 use nalgebra::Vector3;
 use std::ops::Range;
@@ -152,6 +152,7 @@ impl DepthPicture {
             Shape::Cylinder { radius, half_length } => {
                 self.scan(&ray, &window, index, |d| meet(cylinder(&origin, d, radius, half_length)));
             }
+            Shape::Convex(ref hull) => self.scan(&ray, &window, index, |d| meet(polyhedron(&origin, d, hull))),
             Shape::Box { half_extents } => self.scan(&ray, &window, index, |d| meet(cuboid(&origin, d, &half_extents))),
         }
     }

@@ -1,11 +1,15 @@
-//! Signed distance between primitive solids.
+//! Signed distance between solids.
 //!
-//! Every solid is a zonotope (centre plus generators) grown by a radius: a ball has no generator, a capsule one, a box
-//! three, a cylinder the seven of the 12-sided prism around it. The difference of two zonotopes is the zonotope of all
-//! their generators, so one routine serves all pairs: separating axes give the depth when the cores overlap, the
-//! Gilbert-Johnson-Keerthi (1988) iteration gives the distance when they do not.
+//! Every solid is a core grown by a radius. The core of a primitive is a zonotope (centre plus generators): a ball has no
+//! generator, a capsule one, a box three, a cylinder the seven of the 12-sided prism around it; a convex hull is its own.
+//! The difference of two cores is the sum of all their generators and hulls, so one routine serves all pairs:
+//! separating axes give the depth when the cores overlap, the Gilbert-Johnson-Keerthi (1988) iteration gives the distance
+//! when they do not.
 
-use crate::{geometry::Pose, shape::Shape};
+mod difference;
+
+use crate::{convex_hull::ConvexHull, geometry::Pose, shape::Shape};
+use difference::Difference;
 use nalgebra::{Matrix3, Vector3};
 
 /// Most generators of one solid: the prism around a cylinder.
@@ -24,8 +28,8 @@ pub(crate) enum Nearness {
     Hit,
 }
 
-/// A convex solid: { centre + Σ aᵢ gᵢ, |aᵢ| ≤ 1 } grown by a radius (m).
-#[derive(Debug, Clone, Copy)]
+/// A convex solid: { centre + Σ aᵢ gᵢ, |aᵢ| ≤ 1 } or a hull, grown by a radius (m).
+#[derive(Debug, Clone)]
 pub struct Convex {
     center: Vector3<f64>,
     generators: [Vector3<f64>; MAX_GENERATORS],
@@ -37,6 +41,31 @@ pub struct Convex {
     girth: f64,
     /// Lengths of a box's generators (m).
     lengths: [f64; BOX],
+    /// A hull, which has no generators.
+    hull: Option<PlacedHull>,
+}
+
+/// A hull whose capsule's middle lies at the centre of its [`Convex`].
+#[derive(Debug, Clone)]
+struct PlacedHull {
+    hull: ConvexHull,
+    rotation: Matrix3<f64>,
+}
+
+impl PlacedHull {
+    /// The vertex furthest along `direction`, from the centre (m).
+    fn support(&self, direction: &Vector3<f64>) -> Vector3<f64> {
+        let local = self.rotation.tr_mul(direction);
+        self.rotation * (self.hull.support(&local).coords - self.hull.capsule().middle)
+    }
+
+    /// Least and greatest reach from the centre along `direction` (m times its length).
+    fn range(&self, direction: &Vector3<f64>) -> (f64, f64) {
+        let local = self.rotation.tr_mul(direction);
+        let middle = self.hull.capsule().middle.dot(&local);
+        let along = self.hull.vertices().iter().map(|vertex| vertex.coords.dot(&local) - middle);
+        along.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), value| (low.min(value), high.max(value)))
+    }
 }
 
 /// Number of generators of a box; no other solid has as many.
@@ -54,6 +83,7 @@ impl Convex {
             spine: Vector3::zeros(),
             girth: 0.0,
             lengths: [0.0; BOX],
+            hull: None,
         };
         match *shape {
             Shape::Sphere { radius } => (local.radius, local.girth) = (radius, radius),
@@ -81,11 +111,17 @@ impl Convex {
                 local.spine = longest.unwrap_or_default();
                 local.girth = (local.bound * local.bound - local.spine.norm_squared()).max(0.0).sqrt();
             }
+            Shape::Convex(ref hull) => {
+                let capsule = hull.capsule();
+                (local.center, local.spine) = (capsule.middle, capsule.spine);
+                (local.girth, local.bound) = (capsule.girth, capsule.bound);
+                local.hull = Some(PlacedHull { hull: hull.clone(), rotation: Matrix3::identity() });
+            }
         }
         if local.bound == 0.0 {
             local.bound = local.generators[..local.count].iter().map(Vector3::norm).sum::<f64>() + local.radius;
         }
-        let mut placed = local;
+        let mut placed = local.clone();
         placed.place(&local, frame_from_shape.rotation.to_rotation_matrix().matrix(), &frame_from_shape.translation.vector);
         placed
     }
@@ -99,6 +135,9 @@ impl Convex {
             *to = rotation * from;
         }
         self.spine = rotation * local.spine;
+        if let (Some(to), Some(from)) = (&mut self.hull, &local.hull) {
+            to.rotation = rotation * from.rotation;
+        }
     }
 
     /// Radius of a ball around the centre that holds the whole solid (m).
@@ -106,32 +145,24 @@ impl Convex {
         self.bound
     }
 
-    /// Centre of symmetry (m).
+    /// Centre of symmetry, or of the capsule around a hull (m).
     pub fn center(&self) -> &Vector3<f64> {
         &self.center
     }
 
     /// Signed distance to the half-space z ≤ `height`, negative when inside (m).
     pub fn height_above(&self, height: f64) -> f64 {
-        let reach: f64 = self.generators[..self.count].iter().map(|g| g.z.abs()).sum();
-        self.center.z - reach - self.radius - height
+        self.center.z - self.reach(&-Vector3::z()) - self.radius - height
     }
 
     /// Signed distance between two solids (m): negative is the shortest translation that separates them.
     pub fn signed_distance(&self, other: &Self) -> f64 {
         let radius = self.radius + other.radius;
-        if self.count <= 1 && other.count <= 1 {
+        if self.is_segment() && other.is_segment() {
             let offset = self.center - other.center;
             return segment_distance(&offset, &self.spine, &other.spine) - radius;
         }
-        let (generators, count) = self.difference(other);
-        let (generators, offset) = (&generators[..count], self.center - other.center);
-        let depth = separation(&offset, generators);
-        // a flat set has no depth, only rounding; whether the origin is inside it is for the distance to say
-        if depth < -1e-12 * (self.bound + other.bound) {
-            return depth - radius;
-        }
-        core_distance(&offset, generators, f64::INFINITY) - radius
+        Difference::new(self, other).signed_distance() - radius
     }
 
     /// Whether the two solids come closer than `margin` (m); cheaper than the distance.
@@ -183,7 +214,7 @@ impl Convex {
             }
             _ => other.box_to_segment(&offset, &self.spine, enough + self.girth) - self.girth,
         };
-        let exact = (self.count <= 1 || a_is_box) && (other.count <= 1 || b_is_box) && !(a_is_box && b_is_box);
+        let exact = (self.is_segment() || a_is_box) && (other.is_segment() || b_is_box) && !(a_is_box && b_is_box);
         if exact { Ok(gap) } else { Err(gap) }
     }
 
@@ -192,8 +223,7 @@ impl Convex {
         if self.faces_separate(other, enough + radius) || other.faces_separate(self, enough + radius) {
             return enough;
         }
-        let (generators, count) = self.difference(other);
-        core_distance(&(self.center - other.center), &generators[..count], enough + radius) - radius
+        Difference::new(self, other).distance(enough + radius) - radius
     }
 
     /// Whether a face of this box shows that the cores are at least `cores` apart (m); never for other solids.
@@ -201,8 +231,9 @@ impl Convex {
         let offset = self.center - other.center;
         self.count == BOX
             && self.generators[..BOX].iter().zip(self.lengths).any(|(normal, length)| {
-                let reach: f64 = other.generators[..other.count].iter().map(|g| g.dot(normal).abs()).sum();
-                offset.dot(normal).abs() - reach >= (cores + length) * length
+                let along = offset.dot(normal);
+                let reach = other.reach(&if along < 0.0 { -normal } else { *normal });
+                along.abs() - reach >= (cores + length) * length
             })
     }
 
@@ -253,11 +284,15 @@ impl Convex {
         }
     }
 
-    fn difference(&self, other: &Self) -> ([Vector3<f64>; 2 * MAX_GENERATORS], usize) {
-        let mut all = [Vector3::zeros(); 2 * MAX_GENERATORS];
-        all[..self.count].copy_from_slice(&self.generators[..self.count]);
-        all[self.count..self.count + other.count].copy_from_slice(&other.generators[..other.count]);
-        (all, self.count + other.count)
+    /// Whether the core is a point or a line.
+    fn is_segment(&self) -> bool {
+        self.count <= 1 && self.hull.is_none()
+    }
+
+    /// How far the core reaches from the centre along `direction` (m times its length).
+    fn reach(&self, direction: &Vector3<f64>) -> f64 {
+        let generators: f64 = self.generators[..self.count].iter().map(|g| g.dot(direction).abs()).sum();
+        self.hull.as_ref().map_or(generators, |hull| generators + hull.range(direction).1)
     }
 }
 
@@ -281,101 +316,4 @@ fn segment_distance(offset: &Vector3<f64>, g: &Vector3<f64>, h: &Vector3<f64>) -
     };
     let ends = [best(offset + g, h, hh), best(offset - g, h, hh), best(-offset + h, g, gg), best(-offset - h, g, gg)];
     ends.into_iter().fold(f64::INFINITY, f64::min).sqrt()
-}
-
-/// Greatest separation of the origin from the zonotope at `offset` over its facet normals; negative is the depth inside.
-fn separation(offset: &Vector3<f64>, generators: &[Vector3<f64>]) -> f64 {
-    let mut greatest = f64::NEG_INFINITY;
-    for (i, a) in generators.iter().enumerate() {
-        for b in &generators[i + 1..] {
-            let normal = a.cross(b);
-            let square = normal.norm_squared();
-            if square <= 1e-12 * a.norm_squared() * b.norm_squared() {
-                continue; // parallel: no facet, or one too thin to matter
-            }
-            let reach: f64 = generators.iter().map(|g| g.dot(&normal).abs()).sum();
-            greatest = greatest.max((offset.dot(&normal).abs() - reach) / square.sqrt());
-        }
-    }
-    if greatest == f64::NEG_INFINITY { 0.0 } else { greatest }
-}
-
-/// Distance of the origin from the zonotope at `offset`; once it is known to exceed `enough`, any lower bound above that.
-fn core_distance(offset: &Vector3<f64>, generators: &[Vector3<f64>], enough: f64) -> f64 {
-    const MAX_ITERATIONS: usize = 64; // polytopes this small need under ten; this only stops a rounding cycle
-    let scale = offset.norm() + generators.iter().map(Vector3::norm).sum::<f64>();
-    let mut nearest = *offset;
-    let mut simplex = Simplex { points: [Vector3::zeros(); 4], count: 0 };
-    for _ in 0..MAX_ITERATIONS {
-        let square = nearest.norm_squared();
-        if square <= 1e-24 * scale * scale {
-            return 0.0;
-        }
-        let support = generators.iter().fold(*offset, |point, g| if g.dot(&nearest) >= 0.0 { point - g } else { point + g });
-        let along = support.dot(&nearest);
-        if along > 0.0 && along * along > enough * enough * square {
-            return along / square.sqrt();
-        }
-        if square - along <= 1e-13 * square || simplex.points[..simplex.count].contains(&support) {
-            return square.sqrt();
-        }
-        simplex.points[simplex.count] = support;
-        simplex.count += 1;
-        let Some(closer) = simplex.reduce() else { return 0.0 };
-        if closer.norm_squared() >= square && simplex.count > 1 {
-            return square.sqrt();
-        }
-        nearest = closer;
-    }
-    nearest.norm()
-}
-
-/// Up to four points; fewer once reduced to the face nearest to the origin.
-struct Simplex {
-    points: [Vector3<f64>; 4],
-    count: usize,
-}
-
-impl Simplex {
-    /// Keeps the smallest face that holds the point nearest to the origin and returns it; `None` if the origin is inside.
-    fn reduce(&mut self) -> Option<Vector3<f64>> {
-        let points = &self.points[..self.count];
-        let (mut best, mut best_square, mut face, mut size) = (Vector3::zeros(), f64::INFINITY, [0; 3], 0);
-        let mut offer = |point: Vector3<f64>, indices: &[usize]| {
-            let square = point.norm_squared();
-            if square < best_square {
-                (best, best_square, size) = (point, square, indices.len());
-                face[..indices.len()].copy_from_slice(indices);
-            }
-        };
-        for (i, a) in points.iter().enumerate() {
-            offer(*a, &[i]);
-            for (j, b) in points.iter().enumerate().skip(i + 1) {
-                let edge = b - a;
-                let t = -a.dot(&edge) / edge.norm_squared();
-                if t > 0.0 && t < 1.0 {
-                    offer(a + edge * t, &[i, j]);
-                }
-                for (k, c) in points.iter().enumerate().skip(j + 1) {
-                    let normal = edge.cross(&(c - a));
-                    let square = normal.norm_squared();
-                    let weights = [normal.dot(&b.cross(c)), normal.dot(&c.cross(a)), normal.dot(&a.cross(b))];
-                    if weights.iter().all(|&w| w > 0.0) && square > 1e-24 * edge.norm_squared() * (c - a).norm_squared() {
-                        offer(normal * (a.dot(&normal) / square), &[i, j, k]);
-                    }
-                }
-            }
-        }
-        if let [a, b, c, d] = points {
-            let whole = (b - a).cross(&(c - a)).dot(&(d - a));
-            let parts = [b.cross(c).dot(d), -c.cross(d).dot(a), d.cross(a).dot(b), -a.cross(b).dot(c)];
-            if whole != 0.0 && parts.iter().all(|&part| part * whole >= 0.0) {
-                return None;
-            }
-        }
-        let kept = face.map(|index| self.points[index]);
-        self.points[..size].copy_from_slice(&kept[..size]);
-        self.count = size;
-        Some(best)
-    }
 }

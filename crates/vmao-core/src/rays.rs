@@ -3,6 +3,7 @@
 //! All solids are convex, so that what a line shares with one is a single span; a ray meets the surface where its span
 //! begins, or, if it starts inside, where it ends. Lengths are counted in lengths of the direction, which need not be one.
 
+use crate::convex_hull::{ConvexHull, Plane};
 use crate::shape::Shape;
 use nalgebra::Vector3;
 
@@ -14,6 +15,7 @@ pub type Span = [f64; 2];
 /// A line that touches the surface only has an empty span there. The direction must not be zero.
 pub fn span(shape: &Shape, origin: &Vector3<f64>, direction: &Vector3<f64>) -> Option<Span> {
     match *shape {
+        Shape::Convex(ref hull) => polyhedron(origin, direction, hull),
         Shape::Sphere { radius } => ball(origin, direction, radius),
         Shape::Capsule { radius, half_length } => capsule(origin, direction, radius, half_length),
         Shape::Cylinder { radius, half_length } => cylinder(origin, direction, radius, half_length),
@@ -38,6 +40,11 @@ pub fn normal(shape: &Shape, point: &Vector3<f64>) -> Vector3<f64> {
     let flat = Vector3::new(point.x, point.y, 0.0);
     let along_z = Vector3::z() * point.z.signum();
     match *shape {
+        Shape::Convex(ref hull) => {
+            let height = |plane: &Plane| plane.normal.dot(point) - plane.offset;
+            let side = hull.planes().iter().max_by(|a, b| height(a).total_cmp(&height(b)));
+            side.map_or_else(Vector3::zeros, |plane| plane.normal)
+        }
         Shape::Sphere { .. } => point.normalize(),
         Shape::Capsule { half_length, .. } => (point - Vector3::z() * point.z.clamp(-half_length, half_length)).normalize(),
         Shape::Cylinder { radius, half_length } if flat.norm() - radius < point.z.abs() - half_length => along_z,
@@ -90,6 +97,26 @@ pub(crate) fn cuboid(origin: &Vector3<f64>, direction: &Vector3<f64>, half_exten
     let [y0, y1] = slab(origin.y, direction.y, *y)?;
     let [z0, z1] = slab(origin.z, direction.z, *z)?;
     some(x0.max(y0).max(z0), x1.min(y1).min(z1))
+}
+
+/// Behind the planes of all faces.
+#[inline]
+pub(crate) fn polyhedron(origin: &Vector3<f64>, direction: &Vector3<f64>, hull: &ConvexHull) -> Option<Span> {
+    let (mut enter, mut leave) = (f64::NEG_INFINITY, f64::INFINITY);
+    for plane in hull.planes() {
+        let (depth, speed) = (plane.offset - plane.normal.dot(origin), plane.normal.dot(direction));
+        if speed > 0.0 {
+            leave = leave.min(depth / speed);
+        } else if speed < 0.0 {
+            enter = enter.max(depth / speed);
+        } else if depth < 0.0 {
+            return None;
+        }
+        if enter > leave {
+            return None;
+        }
+    }
+    Some([enter, leave])
 }
 
 /// The infinite cylinder about z; a line along z is inside all the way or not at all.

@@ -27,18 +27,18 @@ pub(crate) struct Reaches {
 
 impl Reaches {
     /// `solids`: the link that each rides on and the solid in that link's frame.
-    pub(crate) fn new(
+    pub(crate) fn new<'s>(
         parent_from_joints: &[(Matrix3<f64>, Vector3<f64>)],
         first_joint: usize,
         first_slot: usize,
-        solids: impl Iterator<Item = (usize, Convex)>,
+        solids: impl Iterator<Item = (usize, &'s Convex)>,
     ) -> Self {
         let reach = |link: usize, solid: &Convex, joint: usize| {
             // Along the chain from the joint's link to the solid; what lies along the axis does not count in the first step.
             let shifts = parent_from_joints[joint + 1..link].iter().map(|(_, shift)| *shift).chain([*solid.center()]);
             shifts.enumerate().map(|(i, v)| if i == 0 { v.xy().norm() } else { v.norm() }).sum::<f64>() + solid.bound()
         };
-        let of_solid = |(link, solid): (usize, Convex)| (0..link).map(|joint| reach(link, &solid, joint)).collect();
+        let of_solid = |(link, solid): (usize, &Convex)| (0..link).map(|joint| reach(link, solid, joint)).collect();
         Self { first_joint, first_slot, of_solids: solids.map(of_solid).collect() }
     }
 }

@@ -2,10 +2,11 @@
 
 mod slow;
 
-use nalgebra::Vector3;
+use nalgebra::{Point3, Vector3};
 use proptest::prelude::*;
 use slow::slow_distance;
 use vmao_core::{
+    convex_hull::ConvexHull,
     distance::Convex,
     geometry::{Pose, pose, translation},
     random::Stream,
@@ -67,7 +68,7 @@ fn closed_forms() {
         ("rod end over a face", (ROD, at(0.1, 0.2, 1.2)), (CUBE, at(0.0, 0.0, 0.0)), 0.1),
     ];
     for (name, a, b, expected) in cases {
-        let found = distance(a, b);
+        let found = distance(a.clone(), b.clone());
         assert!((found - expected).abs() < 1e-9, "{name}: {found}, not {expected}");
     }
 }
@@ -77,10 +78,10 @@ fn a_cylinder_is_at_most_its_prism_too_large() {
     let cylinder = Shape::Cylinder { radius: 0.2, half_length: 0.4 };
     for step in 0..48 {
         let angle = f64::from(step) * std::f64::consts::TAU / 48.0;
-        let side = distance((cylinder, at(0.0, 0.0, 0.0)), (BALL, at(angle.cos(), angle.sin(), 0.1)));
+        let side = distance((cylinder.clone(), at(0.0, 0.0, 0.0)), (BALL, at(angle.cos(), angle.sin(), 0.1)));
         assert!(side <= 0.7 + 1e-9 && side > 0.7 - 0.2 * 0.0353, "{angle}: {side}");
     }
-    let top = distance((cylinder, at(0.0, 0.0, 0.0)), (BALL, at(0.05, 0.02, 1.0)));
+    let top = distance((cylinder.clone(), at(0.0, 0.0, 0.0)), (BALL, at(0.05, 0.02, 1.0)));
     assert!((top - 0.5).abs() < 1e-9, "{top}");
 }
 
@@ -96,12 +97,22 @@ fn heights_over_the_floor() {
     assert!((over(CUBE, on_edge) - (0.75 - std::f64::consts::FRAC_1_SQRT_2)).abs() < 1e-9);
 }
 
+/// A hull of few vertices, its frame anywhere near.
+fn stone(seed: u64) -> Shape {
+    let mut stream = Stream::new(seed, &[]);
+    let middle = Vector3::new(stream.normal(), stream.normal(), stream.normal()) * 0.2;
+    let mut point = || Point3::from(middle + Vector3::new(stream.normal(), stream.normal(), stream.normal()) * 0.15);
+    let points: Vec<Point3<f64>> = (0..9).map(|_| point()).collect();
+    Shape::Convex(ConvexHull::around(&points, 9).unwrap())
+}
+
 fn shapes() -> impl Strategy<Value = Shape> {
     let size = 0.02..0.4_f64;
     prop_oneof![
         size.clone().prop_map(|radius| Shape::Sphere { radius }),
         (size.clone(), size.clone()).prop_map(|(radius, half_length)| Shape::Capsule { radius, half_length }),
         [size.clone(), size.clone(), size].prop_map(|half_extents| Shape::Box { half_extents }),
+        (0_u64..10_000).prop_map(stone),
     ]
 }
 
@@ -118,7 +129,7 @@ proptest! {
 
     #[test]
     fn distances_agree_with_alternating_projections(a in (shapes(), poses(1.0)), b in (shapes(), poses(1.0))) {
-        let found = distance(a, b);
+        let found = distance(a.clone(), b.clone());
         let slow = slow_distance(&a, &b);
         // the slow search only ever comes from above, and stalls where two faces are nearly parallel
         prop_assert!(found.max(0.0) <= slow + 1e-9 && found.max(0.0) > slow - 2e-3, "{found} against {slow}");
@@ -126,7 +137,7 @@ proptest! {
 
     #[test]
     fn the_depth_is_the_shortest_way_out(a in (shapes(), poses(0.2)), b in (shapes(), poses(0.2))) {
-        let depth = -distance(a, b);
+        let depth = -distance(a.clone(), b.clone());
         prop_assume!(depth > 1e-3);
         let (first, mut stream) = (Convex::new(&a.0, &a.1), Stream::new(depth.to_bits(), &[]));
         let moved = |by: Vector3<f64>| first.signed_distance(&Convex::new(&b.0, &(Pose::from_parts(by.into(), Default::default()) * b.1)));
@@ -158,7 +169,7 @@ proptest! {
         };
         let [x, y, z] = offset.map(|step| 0.1 * f64::from(step));
         let (a, b) = (solid(0, Pose::identity()), solid(1, at(x, y, z)));
-        let (found, slow) = (distance(a, b), slow_distance(&a, &b));
+        let (found, slow) = (distance(a.clone(), b.clone()), slow_distance(&a, &b));
         prop_assert!((found.max(0.0) - slow).abs() < 1e-6, "{found} against {slow}");
     }
 }

@@ -29,10 +29,10 @@ fn placed(world: &CollisionWorld, q: &[f64]) -> Vec<(usize, usize, (Shape, Pose)
         let links = arm.chain.link_poses(own);
         for LinkSolid { link, solid } in &arm.solids {
             let base_from_link = if *link == 0 { Pose::identity() } else { links[(link - 1).min(6)] };
-            all.push((index, *link, (solid.shape, arm.world_from_base * base_from_link * solid.carrier_from_solid)));
+            all.push((index, *link, (solid.shape.clone(), arm.world_from_base * base_from_link * solid.carrier_from_solid)));
         }
     }
-    all.extend(world.obstacles.iter().map(|o| (usize::MAX, 0, (o.solid.shape, o.solid.carrier_from_solid))));
+    all.extend(world.obstacles.iter().map(|o| (usize::MAX, 0, (o.solid.shape.clone(), o.solid.carrier_from_solid))));
     all
 }
 
@@ -43,6 +43,7 @@ fn slow_free(world: &CollisionWorld, q: &[f64]) -> bool {
         Shape::Sphere { radius } => radius,
         Shape::Capsule { radius, half_length } | Shape::Cylinder { radius, half_length } => radius + half_length,
         Shape::Box { half_extents: [x, y, z] } => x + y + z,
+        Shape::Convex(_) => f64::INFINITY,
     };
     for (i, (arm, link, a)) in solids.iter().enumerate() {
         if let (Some(floor), true) = (world.floor_height, *arm != usize::MAX && *link > 1) {

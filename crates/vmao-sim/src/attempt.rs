@@ -3,6 +3,7 @@
 use crate::assignment::assignments;
 use crate::cameras::observe;
 use crate::combinations::{Choices, Reserve, compatible_grasps, free_alone, joint_positions_with};
+use crate::dependency_root::{choose, grasp_sequence, step_goal};
 use crate::failure::Failure;
 use crate::grasping::{Grasp, GraspConfig, object_cloud, reachable_grasps};
 use crate::measures::Measuring;
@@ -64,6 +65,8 @@ pub(crate) struct Attempt<'a> {
     order: GraspOrder,
     seed: u64,
     index: u64,
+    /// The parts in the order in which they are grasped.
+    sequence: Vec<PartId>,
     /// Which arm grasps each part.
     arms: Vec<ArmId>,
     start: ObjectState,
@@ -101,8 +104,12 @@ impl<'a> Attempt<'a> {
         }
         let graph = scene.graph.clone();
         let start = simulation.object_state();
-        let goal = sample_goal(scene, &config.goal, &start, scene.root, &mut draw(Draw::Goal));
-        let goal_parts = part_poses(&scene.object, &graph, goal.root, &goal.world_from_root, &goal.joint_positions);
+        // Drawn as a motion of part 0 whatever the root, so that all roots meet the same goals.
+        let drawn = sample_goal(scene, &config.goal, &start, &mut draw(Draw::Goal));
+        let goal_parts = part_poses(&scene.object, &graph, drawn.root, &drawn.world_from_root, &drawn.joint_positions);
+        let root = choose(scene, &config.motion, order, &start, &drawn);
+        let goal = drawn.with_root(&scene.object, &graph, root);
+        let sequence = grasp_sequence(&graph, goal.root, order);
         if recording == Recording::On {
             simulation.recorder = Some(Recorder::new(&simulation, goal_parts.clone()));
         }
@@ -117,6 +124,7 @@ impl<'a> Attempt<'a> {
             order,
             seed,
             index,
+            sequence,
             arms,
             start,
             goal,
@@ -145,18 +153,10 @@ impl<'a> Attempt<'a> {
         }
     }
 
-    /// Where the object shall go once the first `count` parts are held: those to their goal, joints to others as they are.
+    /// Where the object shall go once the first `count` parts of the sequence are held.
     pub(crate) fn step_goal(&self, count: usize) -> ObjectGoal {
         let now = self.simulation.object_state();
-        let held = |part: PartId| usize::from(part.0) < count;
-        let object = &self.scene.object;
-        let both = object.positions_by_joint(&self.goal.joint_positions).zip(object.positions_by_joint(&now.joint_positions));
-        let joint_positions = both
-            .flat_map(|((joint, goal), (_, now))| if held(joint.parent) && held(joint.child) { goal } else { now })
-            .copied()
-            .collect();
-        let root = if held(self.goal.root) { self.goal.root } else { PartId(0) };
-        ObjectGoal { root, world_from_root: self.goal_parts[usize::from(root.0)], joint_positions }
+        step_goal(&self.scene.object, (&self.goal, &self.goal_parts), &self.sequence[..count], &now)
     }
 
     /// Looks at the scene and asks the model for the contacts of the grasps `step`.
@@ -172,18 +172,18 @@ impl<'a> Attempt<'a> {
         let state = self.simulation.object_state();
         let mut contacts = Vec::new();
         for grasp in step {
-            let part = PartId(grasp as u16);
-            let world_from_part = state.world_from_parts[grasp];
+            let part = self.sequence[grasp];
+            let world_from_part = state.world_from_parts[usize::from(part.0)];
             let query = ContactQuery { grasp, part, observation: &observation, world_from_part: &world_from_part };
             let mut stream = Stream::new(self.seed, &[self.index, Draw::Contacts as u64, grasp as u64]);
             let fingers = time(Stage::Proposal, || model.propose(&query, &mut stream))
-                .ok_or_else(|| Failure::new(FailureStage::NoContact, format!("nothing to touch was seen on part {grasp}")))?;
+                .ok_or_else(|| Failure::new(FailureStage::NoContact, format!("nothing to touch was seen on part {}", part.0)))?;
             if fingers.iter().flat_map(|point| point.iter()).any(|value| !value.is_finite()) {
-                let why = format!("the points proposed on part {grasp} are not finite: {} and {}", fingers[0], fingers[1]);
+                let why = format!("the points proposed on part {} are not finite: {} and {}", part.0, fingers[0], fingers[1]);
                 return Err(Failure::new(FailureStage::NoContact, why));
             }
             let contact = Contact { part, fingers: fingers.map(|point| world_from_part.inverse_transform_point(&point)) };
-            let (arm, observation) = (self.arms[grasp], observation.clone());
+            let (arm, observation) = (self.arms[usize::from(part.0)], observation.clone());
             self.grasps.push(GraspRecord { arm, contact, observation, world_from_part, world_from_gripper: None });
             let steps = self.simulation.steps;
             if let Some(recorder) = &mut self.simulation.recorder {
@@ -220,7 +220,8 @@ impl<'a> Attempt<'a> {
         let motion = self.waypoints(&self.trajectory(self.step_goal(first + contacts.len())));
         let mut candidates = Vec::new();
         for (grasp, fingers) in contacts.iter().enumerate() {
-            let (arm, part) = (arms[first + grasp], PartId((first + grasp) as u16));
+            let part = self.sequence[first + grasp];
+            let arm = arms[usize::from(part.0)];
             let reached = reachable_grasps(&self.simulation, config, (arm, part), (&cloud, fingers), &motion, stream)?;
             candidates.push(free_alone(&self.simulation, config, &holders, &motion[0], reached));
         }
@@ -228,7 +229,7 @@ impl<'a> Attempt<'a> {
         compatible_grasps(&self.simulation, config, &candidates, &holders, &reserve)
     }
 
-    /// How the parts from `next` on could be taken where the object is after `motion`: as demonstrated, on average.
+    /// How the parts that are grasped from `next` on could be taken where the object is after `motion`: as demonstrated, on average.
     fn reserve(&self, arms: &[ArmId], next: usize, motion: &[Vec<Pose>], stream: &mut Stream) -> Reserve {
         let world_from_parts = motion[motion.len() - 1].clone();
         let between = |share: f64| {
@@ -237,9 +238,10 @@ impl<'a> Attempt<'a> {
         };
         let motion: Vec<Vec<Pose>> = (0..=RESERVE_WAYPOINTS).map(|i| between(i as f64 / RESERVE_WAYPOINTS as f64)).collect();
         let mut grasps = Vec::new();
-        for part in next..self.part_count() {
+        for &place in &self.sequence[next..] {
+            let part = usize::from(place.0);
             let fingers = self.scene.hold_fingers[part].map(|point| world_from_parts[part] * point);
-            let (arm, place) = (arms[part], PartId(part as u16));
+            let arm = arms[part];
             // Cheaper than the later search itself: few postures of each gripper pose.
             let config = GraspConfig {
                 approaches: self.config.grasp.approaches / 2,
@@ -258,12 +260,13 @@ impl<'a> Attempt<'a> {
     fn assign(&mut self, arms: &[ArmId], choices: Vec<Vec<Grasp>>) -> Vec<Vec<Grasp>> {
         let first = self.held.len();
         self.arms = arms.to_vec();
-        for (record, arm) in self.grasps.iter_mut().zip(arms).skip(first) {
-            record.arm = *arm;
+        let taken_by = |part: &PartId| arms[usize::from(part.0)];
+        for (record, part) in self.grasps.iter_mut().zip(&self.sequence).skip(first) {
+            record.arm = taken_by(part);
         }
         if let Some(recorder) = &mut self.simulation.recorder {
-            for (contact, arm) in recorder.rollout.contacts.iter_mut().zip(arms).skip(first) {
-                contact.1 = arm.0;
+            for (contact, part) in recorder.rollout.contacts.iter_mut().zip(&self.sequence).skip(first) {
+                contact.1 = taken_by(part).0;
             }
         }
         choices
@@ -331,7 +334,9 @@ impl<'a> Attempt<'a> {
             let part = &self.scene.object.parts[usize::from(grasp.part.0)].name;
             self.note(format!("arm {} reaches for {part}", grasp.arm.0));
             self.simulation.grips[usize::from(grasp.arm.0)] = Grip::Open(grasp.opening);
-            self.grasps[usize::from(grasp.part.0)].world_from_gripper = Some(grasp.world_from_tool);
+            for record in self.grasps.iter_mut().filter(|record| record.contact.part == grasp.part) {
+                record.world_from_gripper = Some(grasp.world_from_tool);
+            }
         }
         time(Stage::Control, || {
             self.simulation.follow(&approach.way, &moving, None, &self.config.motion)?;

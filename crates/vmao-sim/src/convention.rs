@@ -3,7 +3,9 @@
 use mujoco_rs::wrappers::mj_data::MjData;
 use mujoco_rs::wrappers::mj_model::MjModel;
 use nalgebra::{Matrix3, UnitQuaternion, Vector3};
+use std::fmt::Write;
 use std::sync::Arc;
+use vmao_core::convex_hull::ConvexHull;
 use vmao_core::geometry::{Pose, pose, position_quaternion};
 use vmao_core::osc::{Jacobian, JointVector, MassMatrix};
 use vmao_core::robots::Inertial;
@@ -57,14 +59,29 @@ pub(crate) fn pose_attributes(pose: &Pose) -> String {
     format!(r#"pos="{x} {y} {z}" quat="{qw} {qx} {qy} {qz}""#)
 }
 
-/// MJCF attributes of a shape. MuJoCo's capsules and cylinders lie along z, as ours.
-pub(crate) fn shape_attributes(shape: &Shape) -> String {
+/// MJCF attributes of a shape; a hull is the mesh asset `mesh`. MuJoCo's capsules and cylinders lie along z, as ours.
+pub(crate) fn shape_attributes(shape: &Shape, mesh: &str) -> String {
     match *shape {
+        Shape::Convex(_) => format!(r#"type="mesh" mesh="{mesh}""#),
         Shape::Sphere { radius } => format!(r#"type="sphere" size="{radius}""#),
         Shape::Capsule { radius, half_length } => format!(r#"type="capsule" size="{radius} {half_length}""#),
         Shape::Cylinder { radius, half_length } => format!(r#"type="cylinder" size="{radius} {half_length}""#),
         Shape::Box { half_extents: [x, y, z] } => format!(r#"type="box" size="{x} {y} {z}""#),
     }
+}
+
+/// MJCF element of a mesh asset. MuJoCo moves a mesh's frame to its centre of mass and corrects the geoms that use it.
+pub(crate) fn hull_element(name: &str, hull: &ConvexHull) -> String {
+    let mut xml = format!(r#"<mesh name="{name}" inertia="convex" vertex=""#);
+    for vertex in hull.vertices() {
+        let _infallible = write!(xml, "{} {} {} ", vertex.x, vertex.y, vertex.z);
+    }
+    xml.push_str(r#"" face=""#);
+    for [a, b, c] in hull.faces() {
+        let _infallible = write!(xml, "{a} {b} {c} ");
+    }
+    xml.push_str(r#""/>"#);
+    xml
 }
 
 /// MJCF element of mass properties. MuJoCo orders full inertias xx yy zz xy xz yz.

@@ -34,6 +34,19 @@ pub struct MotionConfig {
     pub waypoints: usize,
 }
 
+impl MotionConfig {
+    /// How long the object takes from one place of its parts to another (s): the slowest part decides.
+    pub(crate) fn duration(&self, from: &[Pose], to: &[Pose]) -> f64 {
+        let mut duration = self.shortest_motion;
+        for (from, to) in from.iter().zip(to) {
+            let distance = (to.translation.vector - from.translation.vector).norm();
+            duration = duration.max(distance / self.object_speed);
+            duration = duration.max(rotation_distance(&from.rotation, &to.rotation) / self.object_turning_speed);
+        }
+        duration
+    }
+}
+
 /// Contacts are examined every this many ticks.
 const WATCH_EVERY: u64 = 10;
 /// A held part may be without pad contact for this many examinations before it counts as lost.

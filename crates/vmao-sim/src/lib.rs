@@ -11,6 +11,7 @@ mod cameras;
 mod carrying;
 mod combinations;
 mod convention;
+mod dependency_root;
 mod error;
 mod execution;
 mod exploration;
@@ -38,6 +39,7 @@ mod trial;
 mod viewpoints;
 
 pub use cameras::CameraConfig;
+pub use dependency_root::{PredictedMotion, Root, predict};
 pub use error::Error;
 pub use execution::MotionConfig;
 pub use exploration::{LabelSet, Proposals, explore_round, scene_of_trial};

@@ -1,6 +1,6 @@
 //! Writes the scene as MJCF: the exact model that trials run on, loadable by MuJoCo alone.
 
-use crate::convention::{inertial_element, pose_attributes, shape_attributes};
+use crate::convention::{hull_element, inertial_element, pose_attributes, shape_attributes};
 use crate::link_meshes::{self, Dress, LinkMesh};
 use crate::scene::SceneConfig;
 use std::fmt::Write;
@@ -9,7 +9,7 @@ use vmao_core::contact::PartId;
 use vmao_core::geometry::Pose;
 use vmao_core::object::{ArticulatedObject, Joint, JointKind};
 use vmao_core::robots::{Gripper, Link, RobotModel};
-use vmao_core::shape::Solid;
+use vmao_core::shape::{Shape, Solid};
 
 /// Half the table's edges along x and y (m), and its colour.
 pub(crate) const TABLE_HALF_WIDTHS: [f64; 2] = [1.0, 0.8];
@@ -18,6 +18,16 @@ pub(crate) const TABLE_COLOR: [f32; 3] = [0.82, 0.78, 0.72];
 /// Name of the body of an object part.
 pub(crate) fn part_name(part: &str) -> String {
     format!("object/{part}")
+}
+
+/// Name of a solid of a part, and of its mesh.
+fn part_solid_name(part: &str, index: usize) -> String {
+    format!("{}/{index}", part_name(part))
+}
+
+/// Name of an obstacle, and of its mesh.
+fn obstacle_name(index: usize) -> String {
+    format!("obstacle{index}")
 }
 
 /// Name of a body, joint or actuator of an arm.
@@ -36,6 +46,9 @@ pub(crate) fn scene(
     let mut xml = String::new();
     header(&mut xml, config);
     xml.push_str(&link_meshes::assets(meshes));
+    for part in &object.parts {
+        hulls(&mut xml, part.solids.iter().enumerate().map(|(index, solid)| (part_solid_name(&part.name, index), solid)));
+    }
     line(&mut xml, "<worldbody>");
     line(&mut xml, r#"<light pos="0 0 2.5" dir="0 0 -1" diffuse="0.7 0.7 0.7"/>"#);
     let ([x, y], [r, g, b]) = (TABLE_HALF_WIDTHS, TABLE_COLOR);
@@ -62,9 +75,10 @@ pub(crate) fn scene(
 pub(crate) fn arms_among(config: &SceneConfig, robots: &[RobotModel], bases: &[Pose], obstacles: &[Obstacle]) -> String {
     let mut xml = String::new();
     header(&mut xml, config);
+    hulls(&mut xml, obstacles.iter().enumerate().map(|(index, obstacle)| (obstacle_name(index), &obstacle.solid)));
     line(&mut xml, "<worldbody>");
     for (index, obstacle) in obstacles.iter().enumerate() {
-        solid_geom(&mut xml, &format!("obstacle{index}"), &obstacle.solid, "");
+        solid_geom(&mut xml, &obstacle_name(index), &obstacle.solid, "");
     }
     for (arm, (robot, base)) in robots.iter().zip(bases).enumerate() {
         arm_body(&mut xml, config, arm, robot, base, &Dress::of(robot.name, &[]));
@@ -95,13 +109,28 @@ fn header(xml: &mut String, config: &SceneConfig) {
     line(xml, &format!(r#"<default><geom condim="4" solref="{} 1"/></default>"#, 2.0 * config.timestep));
 }
 
+/// The mesh assets of those solids that are hulls, each under the name of its geom.
+fn hulls<'a>(xml: &mut String, solids: impl Iterator<Item = (String, &'a Solid)>) {
+    let elements: Vec<String> = solids
+        .filter_map(|(name, solid)| match &solid.shape {
+            Shape::Convex(hull) => Some(hull_element(&name, hull)),
+            Shape::Sphere { .. } | Shape::Capsule { .. } | Shape::Cylinder { .. } | Shape::Box { .. } => None,
+        })
+        .collect();
+    if !elements.is_empty() {
+        line(xml, "<asset>");
+        elements.iter().for_each(|element| line(xml, element));
+        line(xml, "</asset>");
+    }
+}
+
 fn solid_geom(xml: &mut String, name: &str, solid: &Solid, extra: &str) {
     let [r, g, b] = solid.color;
     line(
         xml,
         &format!(
             r#"<geom name="{name}" {} {} rgba="{r} {g} {b} 1" {extra}/>"#,
-            shape_attributes(&solid.shape),
+            shape_attributes(&solid.shape, name),
             pose_attributes(&solid.carrier_from_solid)
         ),
     );
@@ -174,7 +203,7 @@ fn part_body(xml: &mut String, config: &SceneConfig, object: &ArticulatedObject,
     for (index, solid) in description.solids.iter().enumerate() {
         let mass = description.mass * solid.shape.volume() / volume;
         let extra = format!(r#"mass="{mass}" friction="{}""#, config.object_friction.mjcf());
-        solid_geom(xml, &format!("{}/{index}", part_name(&description.name)), solid, &extra);
+        solid_geom(xml, &part_solid_name(&description.name, index), solid, &extra);
     }
     for joint in &object.joints {
         let came_by = from.is_some_and(|(edge, _)| edge.name == joint.name);

@@ -2,6 +2,7 @@
 
 use crate::convention::Data;
 use crate::convention::ball_joint_position;
+use crate::dependency_root::Root;
 use crate::error::Error;
 use crate::layout::{BasePlacement, Layout, Spacing, base_poses};
 use crate::mjcf;
@@ -109,8 +110,8 @@ pub struct Scene {
     pub(crate) hold_fingers: Vec<[Point3<f64>; 2]>,
     /// Its graph.
     pub graph: ObjectGraph,
-    /// The dependency root of its motions.
-    pub root: PartId,
+    /// The dependency root of its motions; part 0 unless chosen by [`Scene::with_root`].
+    pub root: Root,
     /// The model as MJCF.
     pub mjcf: String,
     /// Simulated time per step (s).
@@ -204,7 +205,7 @@ impl Scene {
             hold_centers,
             hold_fingers,
             graph,
-            root: PartId(0),
+            root: Root::Part(PartId(0)),
             mjcf,
             timestep: config.timestep,
             model: Arc::new(model),
@@ -219,6 +220,12 @@ impl Scene {
 }
 
 impl Scene {
+    /// The same scene with another dependency root: `first`, `auto`, or a part's name. Fails on other names.
+    pub fn with_root(mut self, name: &str) -> Result<Self, Error> {
+        self.root = Root::named(&self.object, name)?;
+        Ok(self)
+    }
+
     /// Writes the object's joint positions (rad or m, flat) into the simulator's coordinates.
     pub(crate) fn set_object_joints(&self, qpos: &mut [f64], joint_positions: &[f64]) {
         let positions: Vec<(&Joint, &[f64])> = self.object.positions_by_joint(joint_positions).collect();

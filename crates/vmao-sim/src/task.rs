@@ -21,7 +21,7 @@ pub struct StartConfig {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct GoalConfig {
-    /// Lowest and highest lift of the root part (m).
+    /// Lowest and highest lift of the object's first part (m).
     pub lift: [f64; 2],
     /// Largest horizontal move (m).
     pub sideways: f64,
@@ -84,13 +84,10 @@ pub(crate) fn lowest_point(scene: &Scene, world_from_root: &Pose, joints: &[f64]
 }
 
 /// A goal for an object that lies at `start`: lifted, moved, turned, tilted, every joint changed; never met at the start.
-pub(crate) fn sample_goal(
-    scene: &Scene,
-    config: &GoalConfig,
-    start: &ObjectState,
-    root: PartId,
-    stream: &mut Stream,
-) -> ObjectGoal {
+///
+/// Lift, move, turn and tilt are those of part 0.
+pub(crate) fn sample_goal(scene: &Scene, config: &GoalConfig, start: &ObjectState, stream: &mut Stream) -> ObjectGoal {
+    let root = PartId(0);
     let world_from_root = &start.world_from_parts[usize::from(root.0)];
     let heading = stream.range(-std::f64::consts::PI, std::f64::consts::PI);
     // Uniform over the disc.

@@ -70,6 +70,8 @@ pub struct Config {
 pub struct ObjectConfig {
     /// A name of the catalogue.
     pub name: String,
+    /// The dependency root: `first`, a part's name, or `auto`.
+    pub root: String,
 }
 
 /// Who manipulates.
@@ -171,6 +173,7 @@ impl Config {
     fn check(&self) -> Result<(), String> {
         let Self { object, robots, scene, start, goal, thresholds, cameras, grasp, motion, osc, explore, evaluate, .. } = self;
         ensure(!object.name.is_empty(), "object.name", "an empty name", "a name of the catalogue")?;
+        ensure(!object.root.is_empty(), "object.root", "an empty name", "first, auto, or the name of a part")?;
         let arms = robots.names.len();
         ensure((1..=MAX_ARMS).contains(&arms), "robots.names", &format!("{arms} arms"), &format!("1 to {MAX_ARMS}"))?;
         within("robots.sawyer_slot", robots.sawyer_slot.into(), (*SLOTS.start()).into(), (*SLOTS.end()).into())?;

@@ -2,7 +2,7 @@
 
 use crate::wording::Place;
 use serde::{
-    Deserialize, Deserializer, Serialize,
+    Deserialize, Deserializer,
     de::{DeserializeOwned, MapAccess, Visitor, value::MapAccessDeserializer},
 };
 use std::{
@@ -11,7 +11,8 @@ use std::{
     marker::PhantomData,
     path::Path,
 };
-use vmao_core::geometry::{self, Pose};
+use vmao_core::geometry::Pose;
+pub use vmao_core::json_pose::{JsonPose, normalized};
 
 /// The largest document that is read (bytes).
 pub const MAX_BYTES: u64 = 64 << 20;
@@ -120,53 +121,6 @@ pub fn objects<'de, T: Deserialize<'de>, D: Deserializer<'de>>(deserializer: D) 
     Vec::<Object<T>>::deserialize(deserializer).map(|list| list.into_iter().map(|Object(value)| value).collect())
 }
 
-/// A pose as documents write it. A field left out is at its neutral value, so `{}` is the identity.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct JsonPose {
-    /// x, y, z (m).
-    #[serde(default)]
-    pub position: [f64; 3],
-    /// w, x, y, z; need not be unit on the way in.
-    #[serde(default = "no_rotation")]
-    pub quaternion: [f64; 4],
-}
-
-fn no_rotation() -> [f64; 4] {
-    [1.0, 0.0, 0.0, 0.0]
-}
-
-impl JsonPose {
-    /// The pose, its quaternion normalised without overflow or underflow; none if the quaternion is zero.
-    pub fn to_pose(&self) -> Option<Pose> {
-        normalized(self.quaternion).map(|quaternion| geometry::pose(self.position, quaternion))
-    }
-
-    /// The pose, or a refusal of its zero quaternion; `path` is where in `document` it stands.
-    pub fn to_pose_at(&self, document: &Document, path: &JsonPath) -> Result<Pose, DocumentError> {
-        let message = "a zero quaternion, expected a rotation [w, x, y, z]";
-        self.to_pose().ok_or_else(|| document.refuse(&path.clone().then("quaternion"), message.to_owned()))
-    }
-}
-
-impl From<&Pose> for JsonPose {
-    fn from(pose: &Pose) -> Self {
-        let (position, quaternion) = geometry::position_quaternion(pose);
-        Self { position, quaternion }
-    }
-}
-
-/// The unit vector along `vector`, at any finite magnitude; none for the zero vector.
-pub fn normalized<const N: usize>(vector: [f64; N]) -> Option<[f64; N]> {
-    let largest = vector.iter().fold(0.0_f64, |largest, x| largest.max(x.abs()));
-    if largest == 0.0 {
-        return None;
-    }
-    let scaled = vector.map(|x| x / largest);
-    let norm = scaled.iter().map(|x| x * x).sum::<f64>().sqrt();
-    Some(scaled.map(|x| x / norm))
-}
-
 /// A JSON text and the name of the file it came from.
 #[derive(Debug)]
 pub struct Document {
@@ -229,29 +183,15 @@ impl Document {
         DocumentError { file: self.file.clone(), path, place, message }
     }
 
+    /// The pose at `path`, or a refusal of its zero quaternion.
+    pub fn pose(&self, pose: &JsonPose, path: &JsonPath) -> Result<Pose, DocumentError> {
+        let message = "a zero quaternion, expected a rotation [w, x, y, z]";
+        pose.to_pose().ok_or_else(|| self.refuse(&path.clone().then("quaternion"), message.to_owned()))
+    }
+
     /// A refusal of the value at `path`, with its line and column.
     pub fn refuse(&self, path: &JsonPath, message: String) -> DocumentError {
         let place = crate::json_place::offset(&self.text, &path.0).map(|offset| Place::of(self.text.as_bytes(), offset));
         DocumentError { file: self.file.clone(), path: path.to_string(), place, message }
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn vectors_of_any_finite_magnitude_have_a_direction() {
-        for scale in [5e-324, 1e-300, 1.0, 1e300, f64::MAX] {
-            let [x, y] = normalized([scale, -scale]).unwrap();
-            assert!((x - 0.5_f64.sqrt()).abs() < 1e-15 && (y + 0.5_f64.sqrt()).abs() < 1e-15, "{scale}");
-        }
-        assert_eq!(normalized([0.0, -0.0]), None);
-    }
-
-    #[test]
-    fn an_empty_pose_is_the_identity() {
-        let pose: JsonPose = serde_json::from_str("{}").unwrap();
-        assert_eq!(pose.to_pose(), Some(Pose::identity()));
     }
 }

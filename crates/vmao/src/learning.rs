@@ -1,10 +1,11 @@
-//! From a data set to checkpoints: one network for each grasp step.
+//! From a data set to checkpoints: one network for each part, `grasp-0` for the object's first and so on.
 
 use crate::config::Config;
 use crate::failure::{Failure, OrBadInput};
 use crate::learned_contacts::LearnedContacts;
 use crate::output::{progress_bar, write_whole};
 use crate::results::Method;
+use crate::scenes::grasps;
 use anyhow::Context;
 use serde::{Deserialize, Serialize};
 use std::fs;
@@ -46,11 +47,11 @@ pub fn model_kind(method: Method) -> ModelKind {
     }
 }
 
-/// The training examples of grasp step `grasp`: what was seen before the successful grasps, and where they touched.
-pub fn examples(records: &[TrialRecord], grasp: usize) -> Vec<Example> {
+/// The training examples of `part`: what was seen before the successful grasps of it, and where they touched.
+pub fn examples(records: &[TrialRecord], part: usize) -> Vec<Example> {
     let successes = records.iter().filter(|record| record.outcome.is_success());
     successes
-        .filter_map(|record| record.grasps.get(grasp))
+        .flat_map(|record| record.grasps.iter().filter(|grasp| usize::from(grasp.contact.part.0) == part))
         .map(|grasp| Example {
             points: grasp.observation.points.clone(),
             colors: grasp.observation.colors.clone(),
@@ -67,7 +68,7 @@ pub fn train_all(
     seed: u64,
     directory: &Path,
 ) -> Result<Vec<EpochLine>, Failure> {
-    let grasps = config.robots.names.len();
+    let grasps = grasps(config)?;
     let mut lines = Vec::new();
     let bar = progress_bar(&format!("train {}", method.title()), (grasps * config.train.epochs) as u64);
     for grasp in 0..grasps {

@@ -5,6 +5,7 @@
 pub mod commands;
 pub mod config;
 mod config_layers;
+mod contact_maps;
 pub mod dataset;
 pub mod evaluation;
 pub mod exploration;

@@ -200,10 +200,10 @@ pub fn answer(document: &Document) -> Result<Answer, DocumentError> {
     let joints = world_joints(document, &request.object, &parts)?;
     let mut world_from_parts = Vec::with_capacity(request.object.parts.len());
     for (index, part) in request.object.parts.iter().enumerate() {
-        world_from_parts.push(part.pose.to_pose_at(document, &JsonPath::key("object").then("parts").at(index).then("pose"))?);
+        world_from_parts.push(document.pose(&part.pose, &JsonPath::key("object").then("parts").at(index).then("pose"))?);
     }
     let deltas = joint_deltas(document, &request, &joints, &world_from_parts)?;
-    let goal_world_from_root = request.goal.root_pose.to_pose_at(document, &JsonPath::key("goal").then("root_pose"))?;
+    let goal_world_from_root = document.pose(&request.goal.root_pose, &JsonPath::key("goal").then("root_pose"))?;
     let goals = goal_part_poses(&graph, &joints, &world_from_parts, &deltas, root, &goal_world_from_root);
 
     let mut answer = Answer { parts: Vec::with_capacity(goals.len()), grippers: Vec::with_capacity(request.grippers.len()) };
@@ -216,7 +216,7 @@ pub fn answer(document: &Document) -> Result<Answer, DocumentError> {
     for (index, gripper) in request.grippers.iter().enumerate() {
         let path = JsonPath::key("grippers").at(index);
         let part = usize::from(parts.find(document, &path.clone().then("part"), &gripper.part)?.0);
-        let world_from_gripper = gripper.pose.to_pose_at(document, &path.clone().then("pose"))?;
+        let world_from_gripper = document.pose(&gripper.pose, &path.clone().then("pose"))?;
         let goal = gripper_goal(&world_from_parts[part], &goals[part], &world_from_gripper);
         if !finite(&goal) {
             return refuse(path, overflow("gripper", &gripper.name));

@@ -249,7 +249,7 @@ fn pose(document: &Document, path: &JsonPath, pose: &JsonPose) -> Result<Pose, D
         let message = format!("{coordinate} m, expected within {MAX_LENGTH} m of the origin");
         return Err(document.refuse(&path.clone().then("position"), message));
     }
-    pose.to_pose_at(document, path)
+    document.pose(pose, path)
 }
 
 /// The least distance to keep (m): as asked, or the default, cut to what start and goal keep.

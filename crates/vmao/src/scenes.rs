@@ -15,6 +15,11 @@ pub fn items(config: &Config, set: InstanceSet) -> Result<Vec<CatalogueItem>, Fa
     (0..INSTANCES).map(|instance| item(instance).ok_or_else(unknown)).collect()
 }
 
+/// Grasps of a trial, one for each part of the configured object; arms beyond them stand by.
+pub fn grasps(config: &Config) -> Result<usize, Failure> {
+    Ok(items(config, InstanceSet::Train)?.iter().map(|item| item.object.parts.len()).max().unwrap_or(0))
+}
+
 /// Compiles the configured scene for every size in `set`. Unknown names and too few or many arms are bad input.
 pub fn scenes(config: &Config, set: InstanceSet) -> Result<Vec<Scene>, Failure> {
     let robot = |name: &String| match name.as_str() {
@@ -29,10 +34,11 @@ pub fn scenes(config: &Config, set: InstanceSet) -> Result<Vec<Scene>, Failure> 
             let message = format!("robots.names: {arms} arms, expected at least {parts}: one for each part of `{object}`");
             return Err(Failure::bad_input(message));
         }
-        Scene::new(&config.scene, robots.clone(), item).map_err(|error| match error {
+        let scene = Scene::new(&config.scene, robots.clone(), item).map_err(|error| match error {
             Error::Placement { cause } => Failure::bad_input(format!("scene.layout: {cause}")),
             other => other.into(),
-        })
+        })?;
+        scene.with_root(&config.object.root).map_err(|error| Failure::bad_input(format!("object.root: {error}")))
     };
     items(config, set)?.into_iter().map(compile).collect()
 }

@@ -42,7 +42,7 @@ pub(super) fn block(low: [f64; 3], high: [f64; 3], color: [f32; 3]) -> Solid {
 
 /// The same solid, carried along with `frame`.
 pub(super) fn placed(frame: &Pose, solid: &Solid) -> Solid {
-    Solid { carrier_from_solid: frame * solid.carrier_from_solid, ..*solid }
+    Solid { carrier_from_solid: frame * solid.carrier_from_solid, ..solid.clone() }
 }
 
 /// A turn by `angle` (rad) about +z.

@@ -19,8 +19,31 @@ fn project(shape: &Shape, world_from_shape: &Pose, point: &Point3<f64>) -> Point
             Point3::new(p.x * shrink, p.y * shrink, p.z.clamp(-half_length, half_length))
         }
         Shape::Box { half_extents: [x, y, z] } => Point3::new(p.x.clamp(-x, x), p.y.clamp(-y, y), p.z.clamp(-z, z)),
+        Shape::Convex(ref hull) => {
+            let corners = |face: &[u32; 3]| face.map(|corner| hull.vertices()[corner as usize]);
+            let outside = |[a, b, c]: [Point3<f64>; 3]| (b - a).cross(&(c - a)).dot(&(p - a)) > 0.0;
+            let seen = hull.faces().iter().map(corners).filter(|&face| outside(face));
+            let nearest = seen.map(|face| on_triangle(face, &p)).min_by(|a, b| (a - p).norm().total_cmp(&(b - p).norm()));
+            nearest.unwrap_or(p)
+        }
     };
     world_from_shape * local
+}
+
+/// The nearest point of a triangle: over its inside, or on one of its sides.
+fn on_triangle(corners: [Point3<f64>; 3], point: &Point3<f64>) -> Point3<f64> {
+    let [a, b, c] = corners;
+    let normal = (b - a).cross(&(c - a));
+    let inside = |from: Point3<f64>, to: Point3<f64>| normal.cross(&(to - from)).dot(&(point - from)) >= 0.0;
+    if inside(a, b) && inside(b, c) && inside(c, a) {
+        return point - normal * ((point - a).dot(&normal) / normal.norm_squared());
+    }
+    let on_side = |from: Point3<f64>, to: Point3<f64>| {
+        let along = to - from;
+        from + along * ((point - from).dot(&along) / along.norm_squared()).clamp(0.0, 1.0)
+    };
+    let sides = [on_side(a, b), on_side(b, c), on_side(c, a)];
+    sides.into_iter().fold(a, |best, next| if (next - point).norm() < (best - point).norm() { next } else { best })
 }
 
 /// Distance by alternating projections (von Neumann): slow, but shares nothing with the code under test.

@@ -3,6 +3,7 @@
 mod cameras;
 mod catalogue;
 mod control;
+mod dependency_root;
 mod internal_forces;
 mod inverse_kinematics;
 mod kinematics;

@@ -2,6 +2,7 @@
 
 use super::{CommonOptions, Session, evaluate::table};
 use crate::{
+    dataset::{self, DatasetWriter},
     exploration::explore,
     failure::Failure,
     learning::{load, train_all},
@@ -33,13 +34,17 @@ pub(super) fn run(_arguments: &DemoArguments, mut session: Session) -> Result<()
     let directory = session.output_directory(&unused(Path::new("runs/demo")))?;
     let (results, report) = session.pool()?.install(|| -> Result<_, Failure> {
         let (config, seed) = (&session.config, session.info.seed);
-        let (explored, records) = explore(config, seed, &directory.join("data"))?;
+        let data = directory.join("data");
+        let writer = DatasetWriter::open(&data)?;
+        session.save(&data)?;
+        let explored = explore(config, seed, &writer)?;
         log(&format!("explored: {} of {} trials accepted", explored.successes, explored.trials));
+        let records = dataset::load(&data)?;
         let mut models = Vec::new();
         for &method in &config.evaluate.methods {
             let place = directory.join("models").join(method.name());
             train_all(config, method, &records, seed, &place)?;
-            models.push(load(&place, config.robots.names.len())?);
+            models.push(load(&place, crate::scenes::grasps(&session.config)?)?);
         }
         let results = table(&session, models, &directory)?;
         Ok((results, write_report(&directory)?))

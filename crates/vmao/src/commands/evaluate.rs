@@ -39,7 +39,7 @@ pub(super) fn run(arguments: &EvaluateArguments, mut session: Session) -> Result
             config.evaluate.orders.clone_from(&arguments.orders);
         }
     })?;
-    let grasps = session.config.robots.names.len();
+    let grasps = crate::scenes::grasps(&session.config)?;
     let places: Vec<PathBuf> = [Method::Vmao, Method::Top1].map(|method| arguments.checkpoint.join(method.name())).into();
     let mut places: Vec<PathBuf> = places.into_iter().filter(|place| place.is_dir()).collect();
     if places.is_empty() {

@@ -2,7 +2,7 @@
 
 use super::{CommonOptions, Session};
 use crate::{
-    dataset,
+    dataset::DatasetWriter,
     exploration::explore,
     failure::{Failure, OrBadInput},
 };
@@ -29,14 +29,18 @@ pub(super) fn run(arguments: &ExploreArguments, mut session: Session) -> Result<
         config.explore.max_trials = arguments.max_trials.unwrap_or(config.explore.max_trials);
     })?;
     let directory = session.out.clone().unwrap_or_else(|| Path::new("runs/explore").to_owned());
-    let begun = directory.join("run.json").is_file();
-    if begun && arguments.resume {
+    if arguments.resume {
         session.info.check_same_run(&directory).or_bad_input()?;
-    } else if directory.is_dir() && !dataset::shards(&directory).or_bad_input()?.is_empty() {
-        let message = format!("{}: holds a data set, expected an empty directory; --resume goes on with it", directory.display());
-        return Err(Failure::bad_input(message));
     }
-    session.output_directory(&directory)?;
-    let (explored, _) = session.pool()?.install(|| explore(&session.config, session.info.seed, &directory))?;
+    let writer = DatasetWriter::open(&directory)?;
+    if !arguments.resume {
+        if !writer.found_files().or_bad_input()?.is_empty() {
+            let directory = directory.display();
+            let message = format!("{directory}: holds a data set, expected an empty directory; --resume goes on with it");
+            return Err(Failure::bad_input(message));
+        }
+        session.save(&directory)?;
+    }
+    let explored = session.pool()?.install(|| explore(&session.config, session.info.seed, &writer))?;
     session.print(&explored)
 }

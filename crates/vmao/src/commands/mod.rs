@@ -12,6 +12,7 @@ mod ocao;
 mod plan;
 mod report;
 mod robot;
+mod sample;
 mod scene;
 mod session;
 mod train;
@@ -45,6 +46,8 @@ enum Command {
     Explore(explore::ExploreArguments),
     /// Train contact networks on an explored data set
     Train(train::TrainArguments),
+    /// Contact maps of a trained model on scenes that were never explored, as PLY and a page
+    Sample(sample::SampleArguments),
     /// Success rates of trained models
     Evaluate(evaluate::EvaluateArguments),
     /// report.html of a run
@@ -99,6 +102,7 @@ fn execute(command: Command, command_line: &[String]) -> Result<(), Failure> {
         Command::Object(arguments) => object::run(&arguments, &session(arguments.action.common())?),
         Command::Explore(arguments) => explore::run(&arguments, session(&arguments.common)?),
         Command::Train(arguments) => train::run(&arguments, &session(&arguments.common)?),
+        Command::Sample(arguments) => sample::run(&arguments, &session(&arguments.common)?),
         Command::Evaluate(arguments) => evaluate::run(&arguments, session(&arguments.common)?),
         Command::Report(arguments) => report::run(&arguments, &session(&arguments.common)?),
         Command::Robot(arguments) => robot::run(&arguments, &session(arguments.action.common())?),

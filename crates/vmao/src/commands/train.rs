@@ -56,7 +56,7 @@ pub(super) fn run(arguments: &TrainArguments, session: &Session) -> Result<(), F
     let directory = session.output_directory(&Path::new("runs/train").join(method.name()))?;
     let lines = session.pool()?.install(|| train_all(&session.config, method, &records, session.info.seed, &directory))?;
     let last = |grasp: usize| lines.iter().rfind(|line| line.grasp == grasp);
-    let validation = (0..session.config.robots.names.len())
+    let validation = (0..crate::scenes::grasps(&session.config)?)
         .filter_map(last)
         .map(|line| Validation { grasp: line.grasp, reconstruction: line.validation_reconstruction, kl: line.validation_kl })
         .collect();

@@ -52,6 +52,7 @@ fn surface(shape: &Shape, stream: &mut Stream) -> Point3<f64> {
             point[stream.index(3)] = up.signum();
             Point3::new(point[0] * h[0], point[1] * h[1], point[2] * h[2])
         }
+        Shape::Convex(ref hull) => hull.vertices()[stream.index(hull.vertices().len())],
     }
 }
 
