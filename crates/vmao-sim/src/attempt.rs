@@ -12,6 +12,7 @@ use crate::profile::{Stage, time};
 use crate::recorder::Recorder;
 use crate::scene::Scene;
 use crate::simulation::{Grip, Simulation};
+use crate::targets::Targets;
 use crate::task::{GoalReach, draw_goal, goal_errors, sample_start};
 use crate::trial::{Recording, Trial, TrialConfig};
 use nalgebra::Point3;
@@ -92,6 +93,9 @@ impl<'a> Attempt<'a> {
         let draw = |draw: Draw| Stream::new(seed, &[index, draw as u64]);
         let (world_from_root, joints) = sample_start(scene, &config.start, &mut draw(Draw::Start));
         let mut simulation = Simulation::new(scene, config.osc, &world_from_root, &joints);
+        if recording == Recording::Targets {
+            simulation.targets = Some(Targets::new(&simulation));
+        }
         for tick in 0..(SETTLE_SECONDS / scene.timestep) as usize {
             simulation.tick();
             if tick > 50 && simulation.object_speed() < REST_SPEED {
@@ -397,6 +401,7 @@ impl<'a> Attempt<'a> {
             };
             rollout
         });
+        let targets = self.simulation.targets.take();
         let (index, seed, order, start, goal, grasps) = (self.index, self.seed, self.order, self.start, self.goal, self.grasps);
         let record = TrialRecord { index, seed, order, start, goal, grasps, outcome, detail, steps, final_errors: self.errors };
         let got_so_far = matches!(outcome, TrialOutcome::Success | TrialOutcome::Failed(FailureStage::Threshold));
@@ -404,6 +409,7 @@ impl<'a> Attempt<'a> {
             record,
             threshold_factor: if got_so_far { self.factor } else { f64::INFINITY },
             rollout,
+            targets,
             motion: self.measuring.finish(),
             reach: self.reach,
         }

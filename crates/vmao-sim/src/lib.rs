@@ -31,6 +31,7 @@ mod reachability;
 mod recorder;
 mod scene;
 mod simulation;
+pub mod targets;
 mod task;
 #[cfg(test)]
 mod tests;

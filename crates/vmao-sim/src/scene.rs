@@ -57,6 +57,10 @@ pub struct SceneConfig {
     pub friction_impedance_ratio: f64,
     /// MuJoCo's `noslip_iterations`.
     pub noslip_iterations: u32,
+    /// MuJoCo's `noslip_tolerance`: noslip ends when an iteration improves by less.
+    pub noslip_tolerance: f64,
+    /// MuJoCo's `sleep_tolerance` (m/s): an object at rest is not simulated until something touches it; 0 for never.
+    pub sleep_tolerance: f64,
     /// Friction of the gripper pads.
     pub pad_friction: Friction,
     /// Friction of the object.

@@ -4,6 +4,7 @@ use crate::convention::{Data, body_pose, free_joint_position, hinge_jacobian, jo
 use crate::profile::{Stage, time};
 use crate::recorder::Recorder;
 use crate::scene::{Owner, Scene};
+use crate::targets::Targets;
 use nalgebra::Vector6;
 use vmao_core::contact::{ArmId, PartId};
 use vmao_core::geometry::Pose;
@@ -31,7 +32,7 @@ pub(crate) struct Touch {
 }
 
 /// Stiffness of the gripper's opening servo (N/m).
-const OPENING_STIFFNESS: f64 = 4000.0;
+pub(crate) const OPENING_STIFFNESS: f64 = 4000.0;
 
 /// One scene in motion.
 pub(crate) struct Simulation<'s> {
@@ -45,6 +46,8 @@ pub(crate) struct Simulation<'s> {
     /// Ticks so far.
     pub(crate) steps: u64,
     pub(crate) recorder: Option<Recorder>,
+    /// Everything that was asked for, if it is kept.
+    pub(crate) targets: Option<Targets>,
     gains: OscGains,
     full_mass: Vec<f64>,
 }
@@ -72,11 +75,15 @@ impl<'s> Simulation<'s> {
             })
             .collect();
         let grips = scene.robots.iter().map(|robot| Grip::Open(robot.gripper.max_opening())).collect();
-        Self { scene, data, chains, goals, grips, steps: 0, recorder: None, gains, full_mass: vec![0.0; nv * nv] }
+        Self { scene, data, chains, goals, grips, steps: 0, recorder: None, targets: None, gains, full_mass: vec![0.0; nv * nv] }
     }
 
     /// One control tick and one physics step: torques from the state at its start.
     pub(crate) fn tick(&mut self) {
+        if let Some(mut targets) = self.targets.take() {
+            targets.note(self);
+            self.targets = Some(targets);
+        }
         time(Stage::Physics, || self.data.step1());
         time(Stage::Control, || self.command());
         time(Stage::Physics, || self.data.step2());

@@ -8,6 +8,7 @@ use crate::grasping::GraspConfig;
 use crate::measures::MotionMeasures;
 use crate::profile::{self, Stage};
 use crate::scene::Scene;
+use crate::targets::Targets;
 use crate::task::{GoalConfig, GoalReach, StartConfig, Thresholds};
 use serde::{Deserialize, Serialize};
 use vmao_core::contact_model::ContactModel;
@@ -43,10 +44,12 @@ pub enum Recording {
     Off,
     /// The motion too.
     On,
+    /// What the controllers were asked for too.
+    Targets,
 }
 
 /// What a trial leaves behind.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone)]
 pub struct Trial {
     /// What is stored.
     pub record: TrialRecord,
@@ -58,6 +61,8 @@ pub struct Trial {
     pub reach: GoalReach,
     /// Its motion, if asked for.
     pub rollout: Option<Rollout>,
+    /// What the controllers were asked for, if it was to be kept.
+    pub targets: Option<Targets>,
 }
 
 /// Runs trial `index` of the run with `seed`: look, choose contacts, grasp, plan, move, until all parts are at the goal.

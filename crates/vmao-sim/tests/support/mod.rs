@@ -32,8 +32,18 @@ struct Shipped {
 
 /// The scene's and the trials' configuration: the shipped one.
 pub(crate) fn configuration() -> (SceneConfig, TrialConfig) {
-    let Shipped { scene, start, goal, thresholds, cameras, grasp, motion, osc } =
-        toml::from_str(include_str!("../../../../configs/demo.toml")).unwrap();
+    configuration_with(&[])
+}
+
+/// The same with some keys (`section.key`) set to other values, as TOML writes them.
+pub(crate) fn configuration_with(settings: &[(&str, &str)]) -> (SceneConfig, TrialConfig) {
+    let mut shipped: toml::Table = include_str!("../../../../configs/demo.toml").parse().unwrap();
+    for (path, value) in settings {
+        let (section, key) = path.split_once('.').unwrap();
+        let value: toml::Table = format!("{key} = {value}").parse().unwrap();
+        shipped[section].as_table_mut().unwrap().extend(value);
+    }
+    let Shipped { scene, start, goal, thresholds, cameras, grasp, motion, osc } = shipped.try_into().unwrap();
     (scene, TrialConfig { start, goal, thresholds, cameras, grasp, motion, osc })
 }
 
@@ -107,4 +117,10 @@ impl ContactModel for WorldPoints {
 /// Cameras that hardly look: for trials that end before anything is grasped.
 pub(crate) fn with_tiny_cameras(config: &TrialConfig) -> TrialConfig {
     TrialConfig { cameras: CameraConfig { width: 8, height: 6, ..config.cameras.clone() }, ..config.clone() }
+}
+
+/// CPU time of the calling thread (s), as Linux counts it.
+pub(crate) fn thread_seconds() -> f64 {
+    let text = std::fs::read_to_string("/proc/thread-self/schedstat").unwrap_or_default();
+    text.split_whitespace().next().and_then(|nanoseconds| nanoseconds.parse::<f64>().ok()).unwrap_or(f64::NAN) * 1e-9
 }
