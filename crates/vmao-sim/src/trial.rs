@@ -77,6 +77,7 @@ pub fn run_trial(
 }
 
 fn manipulate(attempt: &mut Attempt<'_>, model: &dyn ContactModel, order: GraspOrder) -> Result<(), Failure> {
+    attempt.settled()?;
     for step in order.steps(attempt.part_count()) {
         let contacts = attempt.propose_contacts(model, step)?;
         let choices = attempt.choose_grasps(&contacts)?;

@@ -8,6 +8,7 @@ mod inverse_kinematics;
 mod kinematics;
 mod link_meshes;
 mod object_trees;
+mod runaways;
 mod starts_and_goals;
 #[path = "../../tests/support/mod.rs"]
 mod support;

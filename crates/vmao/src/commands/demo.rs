@@ -37,7 +37,7 @@ pub(super) fn run(_arguments: &DemoArguments, mut session: Session) -> Result<()
         let data = directory.join("data");
         let writer = DatasetWriter::open(&data)?;
         session.save(&data)?;
-        let explored = explore(config, seed, &writer)?;
+        let explored = explore(config, &session.info, &writer, None)?;
         log(&format!("explored: {} of {} trials accepted", explored.successes, explored.trials));
         let records = dataset::load(&data)?;
         let mut models = Vec::new();

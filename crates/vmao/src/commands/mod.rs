@@ -20,6 +20,7 @@ pub use session::{CommonOptions, Session};
 
 use crate::{
     failure::{Failure, silence_contained_panics},
+    interruption::heed,
     output::{log, print},
 };
 use clap::{Parser, Subcommand};
@@ -61,7 +62,7 @@ enum Command {
     Plan(plan::PlanArguments),
 }
 
-/// Runs the program on these arguments, its own name first: 0 done, 1 the work failed, 2 bad input or usage.
+/// Runs the program on these arguments, its own name first: 0 done, 1 the work failed, 2 bad input or usage, 130 Ctrl-C.
 pub fn main(arguments: impl IntoIterator<Item = OsString>) -> ExitCode {
     silence_contained_panics();
     let arguments: Vec<OsString> = arguments.into_iter().collect();
@@ -74,6 +75,9 @@ pub fn main(arguments: impl IntoIterator<Item = OsString>) -> ExitCode {
         // `--help` and `--version` are answers.
         Err(message) => return finish(print(message.render().to_string().trim_end()).map_err(Failure::from)),
     };
+    if let Err(error) = heed() {
+        return finish(Err(Failure::Work(error.into())));
+    }
     let arguments: Vec<String> = arguments.iter().map(|argument| argument.to_string_lossy().into_owned()).collect();
     let result = execute(line.command, &arguments);
     if let Some(seconds) = vmao_sim::profile::seconds() {
