@@ -3,6 +3,7 @@
 //! To add a command: a module here with its `clap::Args` (flatten [`CommonOptions`] into it) and
 //! `pub(super) fn run(arguments, &Session) -> Result<(), Failure>`, and its line in `Command` and in `execute`.
 
+mod dataset;
 mod demo;
 mod evaluate;
 mod explore;
@@ -15,6 +16,7 @@ mod robot;
 mod scene;
 mod session;
 mod train;
+mod verify;
 
 pub use session::{CommonOptions, Session};
 
@@ -44,12 +46,16 @@ enum Command {
     Object(object::ObjectArguments),
     /// Algorithm 1: grow a label set from demonstrations, in physics
     Explore(explore::ExploreArguments),
+    /// Data sets: merge those of shards, say what is in one, show a trial
+    Dataset(dataset::DatasetArguments),
     /// Train contact networks on an explored data set
     Train(train::TrainArguments),
     /// Success rates of trained models
     Evaluate(evaluate::EvaluateArguments),
     /// report.html of a run
     Report(report::ReportArguments),
+    /// Run recorded trials again and compare them bit for bit
+    Verify(verify::VerifyArguments),
     /// Meshes of the robots, for pictures
     Robot(robot::RobotArguments),
     /// The simulated scene as MJCF
@@ -102,9 +108,11 @@ fn execute(command: Command, command_line: &[String]) -> Result<(), Failure> {
         Command::Demo(arguments) => demo::run(&arguments, session(&arguments.common)?),
         Command::Object(arguments) => object::run(&arguments, &session(arguments.action.common())?),
         Command::Explore(arguments) => explore::run(&arguments, session(&arguments.common)?),
+        Command::Dataset(arguments) => dataset::run(&arguments, &session(arguments.action.common())?),
         Command::Train(arguments) => train::run(&arguments, &session(&arguments.common)?),
         Command::Evaluate(arguments) => evaluate::run(&arguments, session(&arguments.common)?),
         Command::Report(arguments) => report::run(&arguments, &session(&arguments.common)?),
+        Command::Verify(arguments) => verify::run(&arguments, &session(&arguments.common)?),
         Command::Robot(arguments) => robot::run(&arguments, &session(arguments.action.common())?),
         Command::Scene(arguments) => scene::run(&arguments, &session(&arguments.common)?),
         Command::Ik(arguments) => ik::run(&arguments, &session(&arguments.common)?),
