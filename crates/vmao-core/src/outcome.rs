@@ -18,7 +18,7 @@ pub enum FailureStage {
     Slip,
     /// Everything held, but the object ended outside the thresholds.
     Threshold,
-    /// The budget of simulated steps ended first.
+    /// The simulation did not come to its end: its steps were spent, or the simulator went astray.
     Timeout,
 }
 

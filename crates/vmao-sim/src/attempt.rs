@@ -79,6 +79,7 @@ pub(crate) struct Attempt<'a> {
     pub(crate) factor: f64,
     /// How the motions of the object went with all parts held.
     pub(crate) measuring: Measuring,
+    settled: Result<(), Failure>,
 }
 
 impl<'a> Attempt<'a> {
@@ -96,9 +97,11 @@ impl<'a> Attempt<'a> {
         if recording == Recording::Targets {
             simulation.targets = Some(Targets::new(&simulation));
         }
+        simulation.max_steps = config.motion.max_steps;
+        let mut settled = Ok(());
         for tick in 0..(SETTLE_SECONDS / scene.timestep) as usize {
-            simulation.tick();
-            if tick > 50 && simulation.object_speed() < REST_SPEED {
+            settled = simulation.advance();
+            if settled.is_err() || tick > 50 && simulation.object_speed() < REST_SPEED {
                 break;
             }
         }
@@ -134,7 +137,13 @@ impl<'a> Attempt<'a> {
             errors,
             factor: f64::INFINITY,
             measuring: Measuring::default(),
+            settled,
         }
+    }
+
+    /// Whether the object came to lie on the table.
+    pub(crate) fn settled(&self) -> Result<(), Failure> {
+        self.settled.clone()
     }
 
     /// Number of parts to take hold of.

@@ -1,7 +1,6 @@
 //! A scene: arms around a table, one object, the compiled simulator model and who owns which of its geoms.
 
-use crate::convention::Data;
-use crate::convention::ball_joint_position;
+use crate::convention::{Data, ball_joint_position, compile};
 use crate::dependency_root::Root;
 use crate::error::Error;
 use crate::layout::{BasePlacement, Layout, Spacing, base_poses};
@@ -184,7 +183,7 @@ impl Scene {
         let CatalogueItem { object, demonstrations } = item;
         let graph = ObjectGraph::of(&object).map_err(|cause| Error::Object { name: object.name.clone(), cause })?;
         let mjcf = mjcf::scene(config, &robots, &world_from_bases, &object, &[]);
-        let model = MjModel::from_xml_string(&mjcf).map_err(|cause| Error::Model { cause: cause.to_string() })?;
+        let model = compile(&mjcf).map_err(|cause| Error::Model { cause })?;
         let arms = robots.iter().enumerate().map(|(arm, robot)| arm_index(&model, arm, robot)).collect::<Result<Vec<_>, _>>()?;
         let part_bodies = object
             .parts

@@ -84,6 +84,7 @@ pub fn run_trial(
 }
 
 fn manipulate(attempt: &mut Attempt<'_>, model: &dyn ContactModel, order: GraspOrder) -> Result<(), Failure> {
+    attempt.settled()?;
     for step in order.steps(attempt.part_count()) {
         let proposals = attempt.propose_contacts(model, step)?;
         let (grasps, approach) = attempt.first_feasible(&proposals)?;

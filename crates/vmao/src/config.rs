@@ -283,6 +283,7 @@ fn check_control(grasp: &GraspConfig, motion: &MotionConfig, osc: &OscGains) -> 
     within("motion.shortest_motion", motion.shortest_motion, 0.1, 60.0)?;
     positive("motion.collision_force", motion.collision_force)?;
     within("motion.waypoints", motion.waypoints as f64, 1.0, 1000.0)?;
+    at_least_one("motion.max_steps", motion.max_steps)?;
     positive("osc.position_stiffness", osc.position_stiffness)?;
     positive("osc.rotation_stiffness", osc.rotation_stiffness)?;
     positive("osc.damping_ratio", osc.damping_ratio)?;

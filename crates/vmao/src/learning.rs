@@ -2,7 +2,9 @@
 
 use crate::config::Config;
 use crate::failure::{Failure, OrBadInput};
+use crate::learned_contacts::{LearnedContacts, methods};
 use crate::output::{progress_bar, write_whole};
+use crate::results::Method;
 use crate::scenes::grasps;
 use anyhow::Context;
 use serde::{Deserialize, Serialize};
@@ -123,6 +125,17 @@ pub fn load(directory: &Path, grasps: usize) -> Result<(ModelKind, Vec<ContactNe
         return Err(Failure::bad_input(message));
     }
     Ok((kind, networks))
+}
+
+/// The networks of every kind that a run directory's `models` holds, for the methods that are configured.
+pub fn load_methods(models: &Path, config: &Config) -> Result<Vec<(Method, LearnedContacts)>, Failure> {
+    let mut found = Vec::new();
+    for place in ModelKind::ALL.map(|kind| models.join(kind.name())) {
+        if place.is_dir() {
+            found.push(load(&place, grasps(config)?)?);
+        }
+    }
+    Ok(methods(&config.evaluate, &found))
 }
 
 fn load_one(directory: &Path) -> Result<ContactNetwork, Failure> {

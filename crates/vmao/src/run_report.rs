@@ -6,8 +6,7 @@ use crate::dataset;
 use crate::evaluation::{Evaluation, TrialLine};
 use crate::failure::{Failure, OrBadInput};
 use crate::json::Document;
-use crate::learned_contacts::methods;
-use crate::learning::{curves, json_lines, load};
+use crate::learning::{curves, json_lines, load_methods};
 use crate::output::write_whole;
 use crate::provenance::RunInfo;
 use crate::report::{
@@ -15,7 +14,6 @@ use crate::report::{
     TrainingCurve, TrainingEpoch, render,
 };
 use crate::results::{Method, Results};
-use crate::scenes::grasps;
 use anyhow::Context;
 use std::collections::BTreeMap;
 use std::io::Write;
@@ -36,13 +34,7 @@ pub fn write_report(directory: &Path) -> Result<PathBuf, Failure> {
     let results: Results = Document::read(&directory.join("results.json")).or_bad_input()?.parse().or_bad_input()?;
     let lines: Vec<TrialLine> = json_lines(&directory.join("trials.jsonl"))?;
     let models = directory.join("models");
-    let mut found = Vec::new();
-    for kind in ModelKind::ALL {
-        if models.join(kind.name()).is_dir() {
-            found.push(load(&models.join(kind.name()), grasps(&config)?)?);
-        }
-    }
-    let evaluation = Evaluation::new(&config, info.seed, methods(&config.evaluate, &found))?;
+    let evaluation = Evaluation::new(&config, info.seed, load_methods(&models, &config)?)?;
     let (exploration, digest) = explored(&config, &directory.join("data"))?;
     let data = ReportData {
         title: format!("vmao · {} with {}", config.object.name, config.robots.names.join(" + ")),

@@ -63,7 +63,8 @@ pub(crate) fn explore(
                     *before = now;
                 }
             };
-            explore_round(&scenes, &config, &labels, &proposals, (SEED, first..(first + ROUND).min(trials)), &done)
+            let indices: Vec<u64> = (first..(first + ROUND).min(trials)).collect();
+            explore_round(&scenes, &config, &labels, &proposals, (SEED, &indices), &done)
         });
         let mut seconds = seconds.into_inner()?;
         seconds.sort_by_key(|&(index, _)| index);

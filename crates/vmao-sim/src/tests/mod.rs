@@ -11,6 +11,7 @@ mod link_meshes;
 mod object_trees;
 mod rays;
 mod reachability;
+mod runaways;
 mod starts_and_goals;
 #[path = "../../tests/support/mod.rs"]
 mod support;

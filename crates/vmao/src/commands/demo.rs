@@ -5,6 +5,7 @@ use crate::{
     dataset::{self, DatasetWriter},
     exploration::explore,
     failure::Failure,
+    interruption::keeps,
     learning::{load, train_all},
     output::{Layout, log, print},
     run_report::write_report,
@@ -39,9 +40,16 @@ pub(super) fn run(_arguments: &DemoArguments, mut session: Session) -> Result<()
         let data = directory.join("data");
         let writer = DatasetWriter::open(&data)?;
         session.save(&data)?;
-        let explored = explore(config, seed, &writer)?;
+        let explored = explore(config, &session.info, &writer, None)?;
         log(&format!("explored: {} of {} trials accepted", explored.successes, explored.trials));
         let records = dataset::load(&data)?;
+        let (place, config_file) = (directory.display(), directory.join("config.toml"));
+        keeps(format!(
+            "the explored data set is kept in {}, finished networks in {place}/models; go on with `vmao train` and `vmao evaluate`, each \
+             with --config {}",
+            data.display(),
+            config_file.display()
+        ));
         let mut models = Vec::new();
         for kind in ModelKind::ALL {
             if config.evaluate.methods.iter().any(|method| method.model() == kind) {

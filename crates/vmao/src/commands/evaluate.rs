@@ -4,6 +4,7 @@ use super::{CommonOptions, Session};
 use crate::{
     evaluation::{Evaluation, save},
     failure::{Failure, OrBadInput},
+    interruption::keeps,
     learned_contacts::methods,
     learning::{copy, load},
     output::{Layout, print},
@@ -55,6 +56,7 @@ pub(super) fn run(arguments: &EvaluateArguments, mut session: Session) -> Result
             copy(place, &kept, grasps)?;
         }
     }
+    keeps(format!("the networks are kept in {}, trials of an unfinished table are not; run it again", directory.display()));
     let results = session.pool()?.install(|| table(&session, &models, &directory))?;
     match session.layout {
         Layout::Line => session.print(&results),

@@ -4,6 +4,7 @@ use super::{CommonOptions, Session};
 use crate::{
     dataset,
     failure::{Failure, OrBadInput},
+    interruption::keeps,
     learning::train_all,
 };
 use serde::Serialize;
@@ -54,6 +55,7 @@ pub(super) fn run(arguments: &TrainArguments, session: &Session) -> Result<(), F
         return Err(Failure::bad_input(format!("{}: no trials, expected a data set", arguments.data.display())));
     }
     let directory = session.output_directory(&Path::new("runs/train").join(kind.name()))?;
+    keeps(format!("the data set is kept, networks that were finished are in {}; run it again", directory.display()));
     let lines = session.pool()?.install(|| train_all(&session.config, kind, &records, session.info.seed, &directory))?;
     let last = |grasp: usize| lines.iter().rfind(|line| line.grasp == grasp);
     let validation = (0..crate::scenes::grasps(&session.config)?)
