@@ -12,8 +12,8 @@ use crate::{
     object::{ArticulatedObject, JointKind},
     object_centric::part_poses,
     object_graph::ObjectGraph,
+    passage::stretch_through,
     random::Stream,
-    ray::stretch_through,
     robots::RobotModel,
     shape::Solid,
 };

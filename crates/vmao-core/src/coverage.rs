@@ -1,6 +1,6 @@
 //! How much of a part's surface contacts have touched: the surface is cut into cubes, and those with a contact are counted.
 
-use crate::{geometry::Pose, object::Part, ray::Passage};
+use crate::{geometry::Pose, object::Part, passage::Passage};
 use nalgebra::{Point3, Unit, Vector3};
 use std::collections::BTreeSet;
 

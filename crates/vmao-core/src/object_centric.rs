@@ -190,6 +190,18 @@ pub fn joint_errors(object: &ArticulatedObject, wanted: &[f64], is: &[f64]) -> V
     .collect()
 }
 
+impl ObjectGoal {
+    /// The same goal configuration spoken of with another dependency root: that part's pose at the goal, the same joints.
+    pub fn with_root(&self, object: &ArticulatedObject, graph: &ObjectGraph, root: PartId) -> Self {
+        let joint_positions = self.joint_positions.clone();
+        if root == self.root {
+            return Self { root, world_from_root: self.world_from_root, joint_positions };
+        }
+        let parts = part_poses(object, graph, self.root, &self.world_from_root, &joint_positions);
+        Self { root, world_from_root: parts[usize::from(root.0)], joint_positions }
+    }
+}
+
 /// The motion of an object from where it really is to its goal, minimum-jerk in time.
 ///
 /// The root's pose and the joint positions are interpolated; Eq. (2) gives every part's pose from its measured start.

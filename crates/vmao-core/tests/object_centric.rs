@@ -290,6 +290,17 @@ proptest! {
         let between = trajectory.part_poses_at(time);
         let root_pose = between[usize::from(root.0)];
         check(&between, &matrices(part_poses(&object, &graph, root, &root_pose, &trajectory.joint_positions_at(time))));
+
+        // The same goal from any other root, and back.
+        let goal = ObjectGoal { root, world_from_root: goal_root, joint_positions: q1.clone() };
+        let at = |goal: &ObjectGoal| part_poses(&object, &graph, goal.root, &goal.world_from_root, &goal.joint_positions);
+        for other in (0..count).map(|part| PartId(part as u16)) {
+            let told = goal.with_root(&object, &graph, other);
+            assert_eq!((told.root, &told.joint_positions), (other, &goal.joint_positions));
+            check(&at(&told), &matrices(at(&goal)));
+            check(&[told.with_root(&object, &graph, root).world_from_root], &matrices(vec![goal_root]));
+        }
+        assert_eq!(goal.with_root(&object, &graph, root), goal);
     }
 }
 

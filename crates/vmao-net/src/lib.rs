@@ -21,6 +21,8 @@ mod network;
 mod objective_checks;
 mod parameters;
 mod pyramid;
+#[cfg(test)]
+mod pytorch_goldens;
 mod tape;
 mod training;
 

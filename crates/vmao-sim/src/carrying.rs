@@ -8,7 +8,7 @@ use crate::profile::{Stage, time};
 use crate::simulation::Simulation;
 use crate::task::{goal_errors, threshold_factor};
 use vmao_core::collision::CollisionChecker;
-use vmao_core::geometry::{Pose, rotation_distance};
+use vmao_core::geometry::Pose;
 use vmao_core::inverse_kinematics::track;
 use vmao_core::object::ObjectGoal;
 use vmao_core::object_centric::{ObjectTrajectory, part_poses};
@@ -38,6 +38,9 @@ impl Attempt<'_> {
                 Err(failure) => blocked = failure,
                 Ok(_) => {
                     let legs = route.len();
+                    if legs > 1 {
+                        self.measuring.detour();
+                    }
                     for (leg, goal) in route.into_iter().enumerate() {
                         let extra = if leg + 1 < legs {
                             0.0
@@ -65,6 +68,7 @@ impl Attempt<'_> {
         let holding: Vec<usize> = held.iter().map(|(arm, _)| usize::from(arm.0)).collect();
         let (all_held, measuring) = (held.len() == self.scene.object.parts.len(), &mut self.measuring);
         let at_tick = |simulation: &Simulation<'_>, time: f64| {
+            measuring.follow(simulation, &holding);
             if all_held {
                 measuring.look(simulation, &holding, || trajectory.part_poses_at(time));
             }
@@ -117,13 +121,7 @@ impl Attempt<'_> {
     pub(crate) fn trajectory(&self, goal: ObjectGoal) -> ObjectTrajectory {
         let now = self.simulation.object_state();
         let parts = part_poses(&self.scene.object, &self.graph, goal.root, &goal.world_from_root, &goal.joint_positions);
-        let motion = &self.config.motion;
-        let mut duration = motion.shortest_motion;
-        for (from, to) in now.world_from_parts.iter().zip(&parts) {
-            let distance = (to.translation.vector - from.translation.vector).norm();
-            duration = duration.max(distance / motion.object_speed);
-            duration = duration.max(rotation_distance(&from.rotation, &to.rotation) / motion.object_turning_speed);
-        }
+        let duration = self.config.motion.duration(&now.world_from_parts, &parts);
         ObjectTrajectory::new(&self.scene.object, &self.graph, now, goal, duration)
     }
 

@@ -40,4 +40,14 @@ pub enum Error {
         /// Which object.
         object: String,
     },
+    /// The dependency root names no part.
+    #[error("object `{object}` has no part `{name}`; a root is one of: first, auto, {}", parts.join(", "))]
+    UnknownRoot {
+        /// The name given.
+        name: String,
+        /// Which object.
+        object: String,
+        /// The names of its parts.
+        parts: Vec<String>,
+    },
 }

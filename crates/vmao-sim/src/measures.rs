@@ -3,10 +3,12 @@
 use crate::scene::Owner;
 use crate::simulation::Simulation;
 use nalgebra::{Matrix3, Vector3};
+use serde::{Deserialize, Serialize};
 use vmao_core::geometry::Pose;
+use vmao_core::osc::JointVector;
 
-/// What was measured while all arms of a trial moved the object together.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
+/// What was measured while the object was moved: paths and speeds by all arms that held it, the rest with all parts held.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct MotionMeasures {
     /// Largest internal force of an arm, mean over 50 ms (N).
     pub peak_internal_force: f64,
@@ -16,11 +18,26 @@ pub struct MotionMeasures {
     pub part_error: f64,
     /// Length of the ways of all hands (m).
     pub hand_path: f64,
+    /// Length of the longest way of a hand (m).
+    pub longest_hand_path: f64,
+    /// Largest speed of a hand, over 10 ms (m/s).
+    pub hand_speed: f64,
+    /// How far all joints of all arms turned (rad).
+    pub joint_travel: f64,
+    /// Motions whose straight route was blocked, so that the object went up first.
+    pub detours: u32,
 }
 
 /// Ticks between two looks, and looks in a mean of forces: contacts of stiff bodies come and go from tick to tick.
 const LOOK_EVERY: u64 = 5;
 const LOOKS: usize = 5;
+
+/// One arm's part of the motions.
+#[derive(Debug, Default, Clone)]
+struct Way {
+    last: Option<(u64, Vector3<f64>, JointVector)>,
+    length: f64,
+}
 
 /// Collects [`MotionMeasures`].
 #[derive(Debug, Default)]
@@ -32,21 +49,45 @@ pub(crate) struct Measuring {
     force_sum: f64,
     squares: f64,
     samples: usize,
-    hands: Vec<Vector3<f64>>,
+    /// Each arm's hand and joints at the last look, and the length of its hand's way so far.
+    arms: Vec<Way>,
     measures: MotionMeasures,
 }
 
 impl Measuring {
-    /// Takes in the state after a tick in which the arms `holding` moved the parts toward `wanted` poses.
+    /// Takes in the paths of the arms `holding` after a tick in which they moved the object.
+    pub(crate) fn follow(&mut self, simulation: &Simulation<'_>, holding: &[usize]) {
+        if !simulation.steps.is_multiple_of(LOOK_EVERY) {
+            return;
+        }
+        self.arms.resize(simulation.scene.arms.len(), Way::default());
+        for &arm in holding {
+            let (way, steps) = (&mut self.arms[arm], simulation.steps);
+            let (hand, joints) = (simulation.tool_pose(arm).translation.vector, simulation.joint_positions(arm));
+            // Between two motions nobody looks.
+            if let Some((before, last_hand, last_joints)) = way.last
+                && before + LOOK_EVERY == steps
+            {
+                let step = (hand - last_hand).norm();
+                way.length += step;
+                let speed = step / (LOOK_EVERY as f64 * simulation.scene.timestep);
+                self.measures.hand_speed = self.measures.hand_speed.max(speed);
+                self.measures.joint_travel += (joints - last_joints).abs().sum();
+            }
+            way.last = Some((steps, hand, joints));
+        }
+    }
+
+    /// Notes that the straight route of a motion was blocked.
+    pub(crate) fn detour(&mut self) {
+        self.measures.detours += 1;
+    }
+
+    /// Takes in the state after a tick in which the arms `holding`, all there are, moved the parts toward `wanted` poses.
     pub(crate) fn look(&mut self, simulation: &Simulation<'_>, holding: &[usize], wanted: impl FnOnce() -> Vec<Pose>) {
         if !simulation.steps.is_multiple_of(LOOK_EVERY) {
             return;
         }
-        let hands: Vec<Vector3<f64>> = holding.iter().map(|&arm| simulation.tool_pose(arm).translation.vector).collect();
-        if self.hands.len() == hands.len() {
-            self.measures.hand_path += hands.iter().zip(&self.hands).map(|(now, before)| (now - before).norm()).sum::<f64>();
-        }
-        self.hands = hands;
         for (part, wanted) in simulation.object_state().world_from_parts.iter().zip(wanted()) {
             self.squares += (part.translation.vector - wanted.translation.vector).norm_squared();
             self.samples += 1;
@@ -72,6 +113,8 @@ impl Measuring {
         MotionMeasures {
             mean_internal_force: self.force_sum / self.windows.max(1) as f64,
             part_error: (self.squares / self.samples.max(1) as f64).sqrt(),
+            hand_path: self.arms.iter().map(|way| way.length).sum(),
+            longest_hand_path: self.arms.iter().map(|way| way.length).fold(0.0, f64::max),
             ..self.measures
         }
     }

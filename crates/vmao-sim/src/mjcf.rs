@@ -11,6 +11,10 @@ use vmao_core::object::{ArticulatedObject, Joint, JointKind};
 use vmao_core::robots::{Gripper, Link, RobotModel};
 use vmao_core::shape::{Shape, Solid};
 
+/// Half the table's edges along x and y (m), and its colour.
+pub(crate) const TABLE_HALF_WIDTHS: [f64; 2] = [1.0, 0.8];
+pub(crate) const TABLE_COLOR: [f32; 3] = [0.82, 0.78, 0.72];
+
 /// Name of the body of an object part.
 pub(crate) fn part_name(part: &str) -> String {
     format!("object/{part}")
@@ -47,10 +51,11 @@ pub(crate) fn scene(
     }
     line(&mut xml, "<worldbody>");
     line(&mut xml, r#"<light pos="0 0 2.5" dir="0 0 -1" diffuse="0.7 0.7 0.7"/>"#);
+    let ([x, y], [r, g, b]) = (TABLE_HALF_WIDTHS, TABLE_COLOR);
     line(
         &mut xml,
         &format!(
-            r#"<geom name="table" type="plane" size="1 0.8 0.05" rgba="0.82 0.78 0.72 1" friction="{}"/>"#,
+            r#"<geom name="table" type="plane" size="{x} {y} 0.05" rgba="{r} {g} {b} 1" friction="{}"/>"#,
             config.table_friction.mjcf()
         ),
     );
@@ -92,11 +97,12 @@ fn line(xml: &mut String, text: &str) {
 fn header(xml: &mut String, config: &SceneConfig) {
     line(xml, r#"<mujoco model="vmao">"#);
     line(xml, r#"<compiler angle="radian" autolimits="true"/>"#);
+    let SceneConfig { timestep, friction_impedance_ratio, noslip_iterations, noslip_tolerance, sleep_tolerance, .. } = config;
+    let sleep = if *sleep_tolerance > 0.0 { "enable" } else { "disable" };
     line(
         xml,
         &format!(
-            r#"<option timestep="{}" integrator="implicitfast" cone="elliptic" impratio="{}" noslip_iterations="{}" solver="Newton" iterations="100" tolerance="1e-8"/>"#,
-            config.timestep, config.friction_impedance_ratio, config.noslip_iterations
+            r#"<option timestep="{timestep}" integrator="implicitfast" cone="elliptic" impratio="{friction_impedance_ratio}" noslip_iterations="{noslip_iterations}" noslip_tolerance="{noslip_tolerance}" solver="Newton" iterations="100" tolerance="1e-8" sleep_tolerance="{sleep_tolerance}"><flag sleep="{sleep}"/></option>"#
         ),
     );
     // Stiff contacts (time constant twice the time step, MuJoCo's floor) keep a held part from creeping.

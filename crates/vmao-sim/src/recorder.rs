@@ -5,8 +5,7 @@ use crate::scene::Scene;
 use crate::simulation::Simulation;
 use nalgebra::Point3;
 use vmao_core::geometry::Pose;
-use vmao_core::observation::PointLabel;
-use vmao_core::rollout::{Rollout, RolloutBody, RolloutEvent};
+use vmao_core::rollout::{Rollout, RolloutEvent};
 
 /// Frames are kept at this interval (s).
 const FRAME_SECONDS: f64 = 0.04;
@@ -25,31 +24,7 @@ impl Recorder {
     /// A recorder of all arms and parts, which begins with the present frame; `goal` holds the parts' goal poses.
     pub(crate) fn new(simulation: &Simulation<'_>, goal: Vec<Pose>) -> Self {
         let scene: &Scene = simulation.scene;
-        let mut bodies = Vec::new();
-        let mut described = Vec::new();
-        for (arm, (index, robot)) in scene.arms.iter().zip(&scene.robots).enumerate() {
-            let gripper = &robot.gripper;
-            let mut links = vec![(robot.base.name, robot.base.solids.clone())];
-            links.extend(robot.joints.iter().map(|joint| (joint.link.name, joint.link.solids.clone())));
-            links.push((gripper.hand.name, gripper.hand.solids.clone()));
-            links.extend(gripper.fingers.iter().map(|finger| {
-                let mut solids = finger.link.solids.clone();
-                solids.push(finger.pad.clone());
-                (finger.link.name, solids)
-            }));
-            for (&body, (name, solids)) in index.bodies.iter().zip(links) {
-                bodies.push(body);
-                described.push(RolloutBody { name: format!("arm{arm}/{name}"), label: PointLabel::Arm(arm as u16), solids });
-            }
-        }
-        for (part, (&body, description)) in scene.part_bodies.iter().zip(&scene.object.parts).enumerate() {
-            bodies.push(body);
-            described.push(RolloutBody {
-                name: description.name.clone(),
-                label: PointLabel::Part(part as u16),
-                solids: description.solids.clone(),
-            });
-        }
+        let (bodies, described) = scene.bodies().into_iter().unzip();
         let every = (FRAME_SECONDS / scene.timestep).round().max(1.0) as u64;
         let rollout = Rollout { bodies: described, frame_seconds: every as f64 * scene.timestep, goal, ..Rollout::default() };
         let mut recorder = Self { rollout, bodies, every, first: simulation.steps };

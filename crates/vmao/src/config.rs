@@ -83,6 +83,8 @@ pub struct ObjectConfig {
     pub sizes: Vec<String>,
     /// Object files that are kept back for evaluation; none for those explored.
     pub held_out: Vec<String>,
+    /// The dependency root: `first`, a part's name, or `auto`.
+    pub root: String,
 }
 
 /// Where Algorithm 1 starts from.
@@ -158,6 +160,8 @@ pub struct EvaluateConfig {
     pub instances: InstanceSet,
     /// The methods compared.
     pub methods: Vec<Method>,
+    /// K, latent codes that best-of-K draws for each grasp.
+    pub best_of: usize,
 }
 
 impl Config {
@@ -245,6 +249,7 @@ impl Config {
     fn check(&self) -> Result<(), String> {
         let Self { object, robots, scene, start, goal, thresholds, cameras, grasp, motion, osc, explore, evaluate, .. } = self;
         ensure(!object.name.is_empty(), "object.name", "an empty name", "a name of the catalogue")?;
+        ensure(!object.root.is_empty(), "object.root", "an empty name", "first, auto, or the name of a part")?;
         let arms = robots.names.len();
         ensure((1..=MAX_ARMS).contains(&arms), "robots.names", &format!("{arms} arms"), &format!("1 to {MAX_ARMS}"))?;
         within("robots.sawyer_slot", robots.sawyer_slot.into(), (*SLOTS.start()).into(), (*SLOTS.end()).into())?;
@@ -258,6 +263,8 @@ impl Config {
         within("scene.base_distance", scene.base_distance, 0.2, 2.0)?;
         within("scene.base_spacing", scene.base_spacing, 0.2, 2.0)?;
         within("scene.timestep", scene.timestep, 1e-4, 5e-3)?;
+        within("scene.noslip_tolerance", scene.noslip_tolerance, 0.0, 1.0)?;
+        within("scene.sleep_tolerance", scene.sleep_tolerance, 0.0, 0.1)?;
         within("scene.friction_impedance_ratio", scene.friction_impedance_ratio, 1.0, 1000.0)?;
         for (key, friction) in [
             ("scene.pad_friction", scene.pad_friction),
@@ -295,6 +302,7 @@ impl Config {
         at_least_one("evaluate.trials", evaluate.trials)?;
         ensure(!evaluate.orders.is_empty(), "evaluate.orders", "no orders", "at least one")?;
         ensure(!evaluate.methods.is_empty(), "evaluate.methods", "no methods", "at least one")?;
+        ensure((1..=1000).contains(&evaluate.best_of), "evaluate.best_of", &evaluate.best_of.to_string(), "1 to 1000")?;
         self.network.validate().map_err(|error| format!("network: {error}"))?;
         self.train.validate().map_err(|error| format!("train: {error}"))
     }
@@ -302,6 +310,14 @@ impl Config {
 
 fn check_cameras(cameras: &CameraConfig) -> Result<(), String> {
     within("cameras.count", cameras.count as f64, 2.0, 16.0)?;
+    ensure(cameras.viewpoints.len() <= 16, "cameras.viewpoints", &cameras.viewpoints.len().to_string(), "at most 16")?;
+    for viewpoint in &cameras.viewpoints {
+        for value in viewpoint.position.into_iter().chain(viewpoint.target) {
+            within("cameras.viewpoints", value, -10.0, 10.0)?;
+        }
+        let away = viewpoint.position.iter().zip(viewpoint.target).map(|(from, to)| (from - to).powi(2)).sum::<f64>().sqrt();
+        ensure(away >= 0.01, "cameras.viewpoints", &format!("a target {away} m from its camera"), "at least 0.01 m")?;
+    }
     within("cameras.width", cameras.width as f64, 16.0, 1024.0)?;
     within("cameras.height", cameras.height as f64, 16.0, 1024.0)?;
     within("cameras.field_of_view_deg", cameras.field_of_view_deg, 1.0, 150.0)?;
@@ -315,7 +331,13 @@ fn check_cameras(cameras: &CameraConfig) -> Result<(), String> {
     within("cameras.points", cameras.points as f64, 64.0, 65_536.0)?;
     within("cameras.table_share + cameras.robot_share", cameras.table_share + cameras.robot_share, 0.0, 1.0)?;
     within("cameras.table_share", cameras.table_share, 0.0, 1.0)?;
-    within("cameras.robot_share", cameras.robot_share, 0.0, 1.0)
+    within("cameras.robot_share", cameras.robot_share, 0.0, 1.0)?;
+    within("cameras.noise.deviation", cameras.noise.deviation, 0.0, 0.1)?;
+    within("cameras.noise.step", cameras.noise.step, 0.0, 0.1)?;
+    within("cameras.noise.dropout", cameras.noise.dropout, 0.0, 1.0)?;
+    within("cameras.noise.grazing_deg", cameras.noise.grazing_deg, 0.0, 90.0)?;
+    within("cameras.noise.edge_dropout", cameras.noise.edge_dropout, 0.0, 1.0)?;
+    within("cameras.noise.edge_step", cameras.noise.edge_step, 1e-4, 1.0)
 }
 
 fn check_control(grasp: &GraspConfig, motion: &MotionConfig, osc: &OscGains) -> Result<(), String> {
@@ -339,6 +361,7 @@ fn check_control(grasp: &GraspConfig, motion: &MotionConfig, osc: &OscGains) -> 
     within("motion.shortest_motion", motion.shortest_motion, 0.1, 60.0)?;
     positive("motion.collision_force", motion.collision_force)?;
     within("motion.waypoints", motion.waypoints as f64, 1.0, 1000.0)?;
+    at_least_one("motion.max_steps", motion.max_steps)?;
     positive("osc.position_stiffness", osc.position_stiffness)?;
     positive("osc.rotation_stiffness", osc.rotation_stiffness)?;
     positive("osc.damping_ratio", osc.damping_ratio)?;

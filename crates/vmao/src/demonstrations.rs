@@ -13,7 +13,7 @@ use vmao_core::{
     distance::Convex,
     geometry::Pose,
     object::Part,
-    ray::stretch_through,
+    passage::stretch_through,
     shape::Shape,
 };
 

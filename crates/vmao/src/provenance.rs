@@ -47,6 +47,11 @@ impl RunInfo {
 
     /// Refuses to go on with the run in `directory` under another seed or configuration: it would mix two runs.
     pub fn check_same_run(&self, directory: &Path) -> Result<(), DocumentError> {
+        if !directory.join("run.json").exists() {
+            let file = directory.display().to_string();
+            let message = "nothing to resume: no `run.json`, expected a run that was begun; leave out --resume to begin one";
+            return Err(DocumentError { file, path: String::new(), place: None, message: message.to_owned() });
+        }
         let document = Document::read(&directory.join("run.json"))?;
         let there: Self = document.parse()?;
         if there.seed != self.seed {

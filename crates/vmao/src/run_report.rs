@@ -1,32 +1,31 @@
 //! The report of a run directory: reads what the run left, runs again the few trials that are shown.
 
 use crate::config::Config;
+use crate::contact_maps::latent_maps;
 use crate::dataset;
 use crate::evaluation::{Evaluation, TrialLine};
-use crate::exploration::failures;
 use crate::failure::{Failure, OrBadInput};
 use crate::json::Document;
-use crate::learning::{curves, json_lines, load};
+use crate::learning::{curves, json_lines, load_methods};
 use crate::output::write_whole;
 use crate::provenance::RunInfo;
 use crate::report::{
-    Cell, ContactMapFigure, ExplorationRound, ExplorationSummary, LatentMap, Provenance, ReportData, RolloutFigure,
-    ThresholdPoint, TrainingCurve, TrainingEpoch, render,
+    Cell, ContactMapFigure, ExplorationRound, ExplorationSummary, Provenance, ReportData, RolloutFigure, ThresholdPoint,
+    TrainingCurve, TrainingEpoch, render,
 };
 use crate::results::{Method, Results};
 use anyhow::Context;
+use std::collections::BTreeMap;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 use vmao_core::catalogue::InstanceSet;
 use vmao_core::order::GraspOrder;
-use vmao_core::outcome::{FailureStage, TrialOutcome};
-use vmao_core::random::Stream;
+use vmao_core::outcome::TrialOutcome;
+use vmao_net::ModelKind;
 use vmao_sim::Recording;
 
-/// Names the stream of the latent codes that are shown.
-const SHOWN_LATENTS: u64 = 1 << 35;
 /// Latent codes shown for each scene, as in the supplement's Figure 4.
-const LATENTS_SHOWN: usize = 5;
+const LATENTS_SHOWN: u64 = 5;
 
 /// Writes `report.html` into a run directory and returns its path.
 pub fn write_report(directory: &Path) -> Result<PathBuf, Failure> {
@@ -35,13 +34,7 @@ pub fn write_report(directory: &Path) -> Result<PathBuf, Failure> {
     let results: Results = Document::read(&directory.join("results.json")).or_bad_input()?.parse().or_bad_input()?;
     let lines: Vec<TrialLine> = json_lines(&directory.join("trials.jsonl"))?;
     let models = directory.join("models");
-    let mut methods = Vec::new();
-    for method in [Method::Vmao, Method::Top1] {
-        if models.join(method.name()).is_dir() {
-            methods.push(load(&models.join(method.name()), config.robots.names.len())?);
-        }
-    }
-    let evaluation = Evaluation::new(&config, info.seed, methods)?;
+    let evaluation = Evaluation::new(&config, info.seed, load_methods(&models, &config)?)?;
     let (exploration, digest) = explored(&config, &directory.join("data"))?;
     let data = ReportData {
         title: format!("vmao · {} with {}", config.object_name(), config.robots.names.join(" + ")),
@@ -70,7 +63,9 @@ fn summary(results: &Results) -> String {
     let cell = |cell: &crate::results::Cell| {
         format!("{} {}: {} of {}", cell.method().title(), cell.order().name(), cell.successes(), cell.trials())
     };
-    format!("Trials that met the goal pose and joint angles. {}.", results.cells.iter().map(cell).collect::<Vec<_>>().join("; "))
+    let cells = results.cells.iter().map(cell).collect::<Vec<_>>().join("; ");
+    let goals = results.goals().map_or_else(String::new, |counts| format!(" Of all, {}.", counts.sentence()));
+    format!("Trials that met the goal pose and joint angles. {cells}.{goals}")
 }
 
 /// The cells of the table, each with its success rate over scaled thresholds.
@@ -106,25 +101,11 @@ fn contact_maps(evaluation: &Evaluation<'_>, lines: &[TrialLine], seed: u64) -> 
         let is_shown = |line: &&TrialLine| line.order == order && line.method == Method::Vmao && line.outcome.is_success();
         let Some(line) = lines.iter().find(is_shown) else { continue };
         let trial = evaluation.trial(order, Method::Vmao, line.index, Recording::Off);
-        let Some((grasp, second)) = trial.as_ref().and_then(|trial| trial.record.grasps.iter().enumerate().nth(1)) else {
-            continue;
-        };
-        let seen = &second.observation;
-        let scene = model.networks[grasp].encode(&seen.points, &seen.colors)?;
-        let mut maps = Vec::new();
-        for shown in 0..LATENTS_SHOWN {
-            let latent = model.latent(grasp, &mut Stream::new(seed, &[SHOWN_LATENTS, shown as u64]));
-            let [finger1, finger2] = model.networks[grasp].decode(&scene, &latent)?.fingers;
-            maps.push(LatentMap { latent, finger1, finger2 });
-        }
-        figures.push(ContactMapFigure {
-            title: title.to_owned(),
-            caption: format!("Trial {}. {caption}", line.index),
-            points: seen.points.clone(),
-            colors: seen.colors.clone(),
-            labels: seen.labels.clone(),
-            maps,
-        });
+        let Some(second) = trial.as_ref().and_then(|trial| trial.record.grasps.get(1)) else { continue };
+        let part = usize::from(second.contact.part.0);
+        let maps = latent_maps(model, part, &second.observation, seed, LATENTS_SHOWN)?;
+        let caption = format!("Trial {}. {caption}", line.index);
+        figures.push(ContactMapFigure::new(title.to_owned(), caption, &second.observation, maps));
     }
     Ok(figures)
 }
@@ -152,18 +133,18 @@ fn rollouts(evaluation: &Evaluation<'_>, lines: &[TrialLine]) -> Vec<RolloutFigu
 
 fn training(models: &Path) -> Result<Vec<TrainingCurve>, Failure> {
     let mut all = Vec::new();
-    for method in [Method::Vmao, Method::Top1] {
-        let lines = curves(&models.join(method.name()))?;
+    for kind in ModelKind::ALL {
+        let lines = curves(&models.join(kind.name()))?;
         let grasps = lines.iter().map(|line| line.grasp + 1).max().unwrap_or(0);
         for grasp in 0..grasps {
             let epoch = |line: &crate::learning::EpochLine| TrainingEpoch {
                 train_reconstruction: f64::from(line.train_reconstruction),
                 validation_reconstruction: line.validation_reconstruction.map_or(f64::NAN, f64::from),
-                kl: if method == Method::Vmao { f64::from(line.train_kl) } else { f64::NAN },
-                beta: if method == Method::Vmao { f64::from(line.beta) } else { f64::NAN },
+                kl: if kind == ModelKind::Vmao { f64::from(line.train_kl) } else { f64::NAN },
+                beta: if kind == ModelKind::Vmao { f64::from(line.beta) } else { f64::NAN },
             };
             let epochs = lines.iter().filter(|line| line.grasp == grasp).map(epoch).collect();
-            all.push(TrainingCurve { model: format!("{}, grasp {}", method.title(), grasp + 1), epochs });
+            all.push(TrainingCurve { model: format!("{}, grasp {}", kind.title(), grasp + 1), epochs });
         }
     }
     Ok(all)
@@ -174,25 +155,27 @@ fn explored(config: &Config, directory: &Path) -> Result<(Option<ExplorationSumm
     if !directory.is_dir() {
         return Ok((None, String::new()));
     }
-    let mut rounds = Vec::new();
-    let mut records = Vec::new();
-    for shard in dataset::shards(directory).or_bad_input()? {
-        let round = dataset::read_shard(&shard).or_bad_input()?;
+    let (mut rounds, mut failures) = (Vec::new(), BTreeMap::new());
+    let mut trials = 0;
+    for round in dataset::rounds(directory).or_bad_input()? {
+        let round = round.or_bad_input()?;
         let successes = round.iter().filter(|record| record.outcome.is_success()).count() as u64;
         rounds.push(ExplorationRound { trials: round.len() as u64, successes });
-        records.extend(round);
+        trials += round.len() as u64;
+        for record in &round {
+            if let TrialOutcome::Failed(stage) = record.outcome {
+                *failures.entry(stage).or_default() += 1;
+            }
+        }
     }
     let demonstrations =
         crate::scenes::items(config, InstanceSet::Train)?.iter().map(|item| item.demonstrations.len() as u64).max();
     let summary = ExplorationSummary {
-        trials: records.len() as u64,
+        trials,
         successes: rounds.iter().map(|round| round.successes).sum(),
         demonstrations: demonstrations.unwrap_or(0),
-        failures: failures(&records)
-            .into_iter()
-            .filter(|(_, count)| *count > 0)
-            .collect::<std::collections::BTreeMap<FailureStage, u64>>(),
+        failures,
         rounds,
     };
-    Ok((Some(summary), dataset::digest(&records)))
+    Ok((Some(summary), dataset::digest_of(directory).or_bad_input()?))
 }

@@ -76,6 +76,11 @@ fn plain_items(config: &Config, set: InstanceSet) -> Result<Vec<CatalogueItem>, 
     (0..INSTANCES).map(|instance| item(instance).ok_or_else(unknown)).collect()
 }
 
+/// Grasps of a trial, one for each part of the configured object; arms beyond them stand by.
+pub fn grasps(config: &Config) -> Result<usize, Failure> {
+    Ok(plain_items(config, InstanceSet::Train)?.iter().map(|item| item.object.parts.len()).max().unwrap_or(0))
+}
+
 fn robots(config: &Config) -> Result<Vec<RobotModel>, Failure> {
     let robot = |name: &String| match name.as_str() {
         "sawyer" => Ok(sawyer(config.robots.sawyer_slot)),
@@ -98,10 +103,11 @@ pub fn scenes(config: &Config, set: InstanceSet) -> Result<Vec<Scene>, Failure> 
     };
     plain_items(config, set)?.iter().try_for_each(check)?;
     let compile = |item: CatalogueItem| {
-        Scene::new(&config.scene, robots.clone(), item).map_err(|error| match error {
+        let scene = Scene::new(&config.scene, robots.clone(), item).map_err(|error| match error {
             Error::Placement { cause } => Failure::bad_input(format!("scene.layout: {cause}")),
             other => other.into(),
-        })
+        })?;
+        scene.with_root(&config.object.root).map_err(|error| Failure::bad_input(format!("object.root: {error}")))
     };
     items(config, set)?.into_iter().map(compile).collect()
 }

@@ -46,6 +46,10 @@ fn bad_usage_and_bad_input_exit_with_two_and_say_what_exists() {
     check_refused(&["robot", "meshes", "panda", "--from", ".", "--out", "o"], "no model of `panda` with meshes below ");
     check_refused(&["scene", "--meshes", "none", "--out", "a.xml"], "error: none/meshes.json: cannot be read: ");
     check_refused(&["ocao", "a.json", "--config", "none.toml"], "none.toml: cannot be read: ");
+    check_refused(
+        &["scene", "--out", "o.xml", "--set", "object.root=jaw"],
+        "object.root: object `pliers` has no part `jaw`; a root is one of: first, auto, lever-a, lever-b",
+    );
 }
 
 #[test]
@@ -120,4 +124,19 @@ fn a_full_disk_is_a_failure_of_the_work_and_a_closed_pipe_is_none() {
     // A file where the output directory should be.
     let output = vmao(directory.path(), &["ocao", "a.json", "--out", "a.json"]);
     assert_eq!((output.status.code(), output.stdout.is_empty()), (Some(1), true));
+}
+
+#[test]
+fn an_arm_that_stands_by_needs_no_network() {
+    let directory = tempfile::tempdir().unwrap();
+    let run = |arguments: &[&str]| {
+        let settings = ["--set", r#"object.name="sticks-1""#, "--set", "train.epochs=1", "--json"];
+        let output = vmao(directory.path(), &[arguments, &settings].concat());
+        assert!(output.status.success(), "{arguments:?}: {}", String::from_utf8_lossy(&output.stderr));
+    };
+    run(&["explore", "--successes", "2", "--max-trials", "8", "--out", "data"]);
+    run(&["train", "--data", "data", "--model", "top1", "--out", "top1"]);
+    run(&["sample", "--checkpoint", "top1", "--scenes", "1", "--out", "maps"]);
+    assert_eq!(fs::read_dir(directory.path().join("maps/maps")).unwrap().count(), 1, "Top-1 has one map");
+    assert!(!directory.path().join("top1/grasp-1").exists(), "one part, one grasp");
 }

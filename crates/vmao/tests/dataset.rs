@@ -1,9 +1,9 @@
-//! The data set on disk: bit-exact, independent of how it was cut into shards, and never trusted when it is read.
+//! The data set on disk: bit-exact, independent of how it was cut into files, and never trusted when it is read.
 #![expect(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
 use nalgebra::Point3;
 use std::{fs, path::Path};
-use vmao::dataset::{DatasetWriter, Shard, digest, load, read_shard, shards, stored};
+use vmao::dataset::{DatasetWriter, RoundFile, digest, load, read_round, round_files, stored};
 use vmao_core::{
     contact::{ArmId, Contact, PartId},
     geometry::{Pose, pose},
@@ -161,7 +161,7 @@ fn a_killed_writer_leaves_finished_rounds_only() {
     assert_eq!(load(directory.path()).unwrap().len(), 4);
     let writer = DatasetWriter::open(directory.path()).unwrap();
     assert!(!torn.exists());
-    let ranges: Vec<(u64, u64)> = writer.shards().unwrap().iter().map(|shard| (shard.first, shard.last)).collect();
+    let ranges: Vec<(u64, u64)> = writer.found_files().unwrap().iter().map(|file| (file.first, file.last)).collect();
     assert_eq!(ranges, [(0, 1), (2, 3)]);
     // The resumed run goes on where the finished rounds end, and the set is that of a run never killed.
     writer.write_round(&records(6)[4..]).unwrap();
@@ -181,13 +181,16 @@ fn gaps_overlaps_and_stray_names_are_refused() {
     write(directory.path(), &records(6), 2);
     let [first, middle] = ["trials-00000000-00000001.parquet", "trials-00000002-00000003.parquet"];
     fs::rename(path(middle), path("aside")).unwrap();
-    check_refused(shards(directory.path()), "trials 2 to 3 are missing");
+    check_refused(round_files(directory.path()), "trials 2 to 3 are missing");
     fs::rename(path("aside"), path("trials-00000001-00000003.parquet")).unwrap();
-    check_refused(shards(directory.path()), "overlap, expected each trial once");
+    check_refused(round_files(directory.path()), "overlap, expected each trial once");
     fs::rename(path("trials-00000001-00000003.parquet"), path("trials-2-3.parquet")).unwrap();
-    check_refused(shards(directory.path()), "file `trials-2-3.parquet`, expected names like trials-00000000-00000015.parquet");
+    check_refused(
+        round_files(directory.path()),
+        "file `trials-2-3.parquet`, expected names like trials-00000000-00000015.parquet",
+    );
     fs::remove_file(path("trials-2-3.parquet")).unwrap();
-    // A shard under another's name.
+    // A file under another's name.
     fs::copy(path(first), path(middle)).unwrap();
     check_refused(load(directory.path()), "row 0, column index: 0, expected 2");
     fs::remove_file(path(middle)).unwrap();
@@ -219,7 +222,7 @@ fn rounds_that_are_none_are_refused_before_anything_is_written() {
         change(&mut changed);
         check_refused(writer.write_round(&[changed]), message);
     }
-    assert_eq!(shards(directory.path()).unwrap(), []);
+    assert_eq!(round_files(directory.path()).unwrap(), []);
     writer.write_round(&[record(1)]).unwrap();
     check_refused(writer.write_round(&[record(1)]), "is there already");
 }
@@ -228,12 +231,12 @@ fn rounds_that_are_none_are_refused_before_anything_is_written() {
 fn no_damage_is_read_as_data_or_gets_out_as_a_panic() {
     let directory = tempfile::tempdir().unwrap();
     write(directory.path(), &records(3), 3);
-    let shard = shards(directory.path()).unwrap().remove(0);
-    let (bytes, expected) = (fs::read(&shard.path).unwrap(), read_shard(&shard).unwrap());
-    let damaged = Shard { path: directory.path().join("damaged"), ..shard };
+    let file = round_files(directory.path()).unwrap().remove(0);
+    let (bytes, expected) = (fs::read(&file.path).unwrap(), read_round(&file).unwrap());
+    let damaged = RoundFile { path: directory.path().join("damaged"), ..file };
     let check = |bytes: &[u8]| {
         fs::write(&damaged.path, bytes).unwrap();
-        match read_shard(&damaged) {
+        match read_round(&damaged) {
             // Bytes that carry no data, such as statistics, may differ.
             Ok(records) => assert_eq!(records, expected),
             Err(error) => assert!(error.to_string().contains("damaged: "), "{error}"),

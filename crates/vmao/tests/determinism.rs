@@ -1,4 +1,4 @@
-//! The same seed gives the same bytes with one worker and with two: data set, weights, results.
+//! The same seed gives the same bytes with one worker and with two: data set, weights, maps, results.
 #![expect(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
 use std::{
@@ -25,6 +25,8 @@ fn run_loop(directory: &Path, workers: &str, seed: &str) -> String {
         with(&["train", "--data", &data, "--model", model, "--out", &format!("{models}/{model}")]);
     }
     with(&["evaluate", "--checkpoint", &models, "--trials", "2", "--out", &table]);
+    let (checkpoint, sample) = (format!("{models}/vmao"), at("sample"));
+    with(&["sample", "--checkpoint", &checkpoint, "--samples", "2", "--scenes", "1", "--out", &sample]);
     String::from_utf8(explored.stdout).unwrap()
 }
 
@@ -42,6 +44,9 @@ fn one_worker_and_two_write_the_same_bytes() {
             files.push(format!("models/{model}/{grasp}/model.safetensors"));
         }
     }
+    let maps = ["sample/maps/scene-0-grasp-1-code-0.ply", "sample/maps/scene-0-grasp-1-code-1.ply"];
+    assert_ne!(fs::read(one.join(maps[0])).unwrap(), fs::read(one.join(maps[1])).unwrap(), "another code, another map");
+    files.extend(maps.map(str::to_owned));
     for file in files {
         assert_eq!(fs::read(one.join(&file)).unwrap(), fs::read(two.join(&file)).unwrap(), "{file}");
     }
@@ -65,7 +70,7 @@ fn an_exploration_that_is_resumed_ends_with_the_digest_of_an_undisturbed_one() {
     };
     let whole = explore("whole", &[]);
     assert_eq!(explore("torn", &[]), whole);
-    // What a kill during the last round leaves: its shard missing, a partial file beside.
+    // What a kill during the last round leaves: its file missing, a partial file beside.
     let torn = directory.path().join("torn");
     fs::rename(torn.join("trials-00000008-00000011.parquet"), torn.join(".trials-00000008-00000011.parquet.partial")).unwrap();
     assert_eq!(explore("torn", &["--resume"]), whole);

@@ -5,6 +5,7 @@ use super::support::configuration;
 use crate::scene::{Owner, Scene};
 use crate::simulation::Simulation;
 use vmao_core::catalogue::{INSTANCES, InstanceSet, NAMES, item};
+use vmao_core::contact::PartId;
 use vmao_core::object_centric::part_poses;
 
 /// The object alone on the table.
@@ -38,7 +39,7 @@ fn check_settles(scene: &Scene, what: &str, index: u64) {
     });
     assert!(touches_table, "{what} does not lie on the table");
     // Constraints hold: the simulator's parts are where the joints say.
-    let ours = part_poses(&scene.object, &scene.graph, scene.root, &state.world_from_parts[0], &state.joint_positions);
+    let ours = part_poses(&scene.object, &scene.graph, PartId(0), &state.world_from_parts[0], &state.joint_positions);
     for (ours, theirs) in ours.iter().zip(&state.world_from_parts) {
         assert!((ours.translation.vector - theirs.translation.vector).norm() < 1e-9, "{what} comes apart");
     }

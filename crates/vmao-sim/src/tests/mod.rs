@@ -3,12 +3,16 @@
 mod cameras;
 mod catalogue;
 mod control;
+mod dependency_root;
 mod hulls;
 mod internal_forces;
 mod inverse_kinematics;
 mod kinematics;
 mod link_meshes;
 mod object_trees;
+mod rays;
+mod reachability;
+mod runaways;
 mod starts_and_goals;
 #[path = "../../tests/support/mod.rs"]
 mod support;

@@ -23,7 +23,7 @@ fn random_pose(stream: &mut Stream) -> Pose {
 }
 
 /// Balls on a random tree, joined either way round in no particular order.
-fn random_tree(stream: &mut Stream, count: u16) -> ArticulatedObject {
+pub(super) fn random_tree(stream: &mut Stream, count: u16) -> ArticulatedObject {
     let ball = Solid { shape: Shape::Sphere { radius: 0.01 }, carrier_from_solid: Pose::identity(), color: [0.5; 3] };
     let part = |index: u16| Part { name: format!("part-{index}"), solids: vec![ball.clone()], mass: 0.1 };
     let mut joints = Vec::new();

@@ -38,7 +38,7 @@ fn draws(scene: &Scene) -> Vec<(ObjectState, ObjectGoal)> {
         assert!((height - 0.002).abs() < 1e-9, "{}: starts {height} m above the table", scene.object.name);
         let world_from_parts = part_poses(&scene.object, &scene.graph, PartId(0), &world_from_root, &joint_positions);
         let start = ObjectState { world_from_parts, joint_positions };
-        let goal = sample_goal(scene, &config.goal, &start, scene.root, &mut stream);
+        let goal = sample_goal(scene, &config.goal, &start, &mut stream);
         (start, goal)
     };
     (0..DRAWS).map(draw).collect()

@@ -2,9 +2,10 @@
 
 use super::{CommonOptions, Session};
 use crate::{
-    dataset,
+    dataset::DatasetWriter,
     exploration::explore,
     failure::{Failure, OrBadInput},
+    sharing::Share,
 };
 use std::path::Path;
 
@@ -19,6 +20,9 @@ pub(super) struct ExploreArguments {
     /// Go on with the data set that is there
     #[arg(long)]
     resume: bool,
+    /// Run part i of n of every round; all parts in one --out, on one file system; `vmao dataset merge` puts them together
+    #[arg(long, value_name = "I/N")]
+    shard: Option<Share>,
     #[command(flatten)]
     pub(super) common: CommonOptions,
 }
@@ -28,15 +32,21 @@ pub(super) fn run(arguments: &ExploreArguments, mut session: Session) -> Result<
         config.explore.successes = arguments.successes.unwrap_or(config.explore.successes);
         config.explore.max_trials = arguments.max_trials.unwrap_or(config.explore.max_trials);
     })?;
-    let directory = session.out.clone().unwrap_or_else(|| Path::new("runs/explore").to_owned());
-    let begun = directory.join("run.json").is_file();
-    if begun && arguments.resume {
+    let place = session.out.clone().unwrap_or_else(|| Path::new("runs/explore").to_owned());
+    let directory = arguments.shard.map_or_else(|| place.clone(), |share| share.directory(&place));
+    if arguments.resume {
         session.info.check_same_run(&directory).or_bad_input()?;
-    } else if directory.is_dir() && !dataset::shards(&directory).or_bad_input()?.is_empty() {
-        let message = format!("{}: holds a data set, expected an empty directory; --resume goes on with it", directory.display());
-        return Err(Failure::bad_input(message));
     }
-    session.output_directory(&directory)?;
-    let (explored, _) = session.pool()?.install(|| explore(&session.config, session.info.seed, &directory))?;
+    let writer = DatasetWriter::open(&directory)?;
+    if !arguments.resume {
+        if !writer.found_files().or_bad_input()?.is_empty() {
+            let directory = directory.display();
+            let message = format!("{directory}: holds a data set, expected an empty directory; --resume goes on with it");
+            return Err(Failure::bad_input(message));
+        }
+        session.save(&directory)?;
+    }
+    let shared = arguments.shard.map(|share| (share, &*place));
+    let explored = session.pool()?.install(|| explore(&session.config, &session.info, &writer, shared))?;
     session.print(&explored)
 }

@@ -92,8 +92,13 @@ impl Session {
     pub fn output_directory(&self, default: &Path) -> Result<PathBuf, Failure> {
         let directory = self.out.as_deref().unwrap_or(default);
         fs::create_dir_all(directory).with_context(|| format!("{}: cannot be made a directory", directory.display()))?;
-        self.info.save(directory, &self.config).with_context(|| format!("{}: cannot be written to", directory.display()))?;
+        self.save(directory)?;
         Ok(directory.to_owned())
+    }
+
+    /// Writes the configuration and `run.json` into a directory.
+    pub fn save(&self, directory: &Path) -> Result<(), Failure> {
+        Ok(self.info.save(directory, &self.config).with_context(|| format!("{}: cannot be written to", directory.display()))?)
     }
 
     /// Writes a JSON document to stdout, on one line with `--json`.

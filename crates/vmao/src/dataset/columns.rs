@@ -1,4 +1,4 @@
-//! The columns of a shard, and how the values of a record are spelled in them.
+//! The columns of a file, and how the values of a record are spelled in them.
 
 use arrow_schema::{DataType, Field, FieldRef, Fields, Schema};
 use std::sync::Arc;
@@ -13,7 +13,7 @@ use vmao_core::{
 pub(super) const SCHEMA_VERSION: &str = "1";
 /// Metadata key of the version of the columns.
 pub(super) const SCHEMA_KEY: &str = "vmao.schema";
-/// Metadata key of the digest of the shard's records.
+/// Metadata key of the digest of the file's records.
 pub(super) const DIGEST_KEY: &str = "vmao.digest";
 
 /// The element of a list column; Parquet's own name for it.
@@ -39,7 +39,7 @@ pub(super) fn grasp_fields() -> Fields {
     ])
 }
 
-/// The columns of a shard, one row for each trial.
+/// The columns of a file, one row for each trial.
 pub(super) fn schema() -> Schema {
     Schema::new(vec![
         Field::new("index", DataType::UInt64, false),

@@ -15,14 +15,37 @@ const LAYOUT: &[u8] = b"vmao records 1\n";
 pub fn digest<'a>(records: impl IntoIterator<Item = &'a TrialRecord>) -> String {
     let mut records: Vec<&TrialRecord> = records.into_iter().collect();
     records.sort_by_key(|record| record.index);
-    let mut bytes = Canonical(Sha256::new_with_prefix(LAYOUT));
-    bytes.count(records.len());
+    let mut digester = Digester::new(records.len());
     for record in records {
-        bytes.record(record);
+        digester.add(record);
     }
-    hex(&bytes.0.finalize())
+    digester.finish()
 }
 
+/// The digest of records that are not all in memory at once.
+#[derive(Debug)]
+pub struct Digester(Canonical);
+
+impl Digester {
+    /// Of `count` records.
+    pub fn new(count: usize) -> Self {
+        let mut bytes = Canonical(Sha256::new_with_prefix(LAYOUT));
+        bytes.count(count);
+        Self(bytes)
+    }
+
+    /// The next record, in index order.
+    pub fn add(&mut self, record: &TrialRecord) {
+        self.0.record(record);
+    }
+
+    /// The digest of all that was added.
+    pub fn finish(self) -> String {
+        hex(&self.0.0.finalize())
+    }
+}
+
+#[derive(Debug)]
 struct Canonical(Sha256);
 
 impl Canonical {

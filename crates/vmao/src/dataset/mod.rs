@@ -1,20 +1,20 @@
-//! The data set: one Parquet file ("shard") for each exploration round, and a digest that does not depend on how it was made.
+//! The data set: one Parquet file for each exploration round, and a digest that does not depend on how it was made.
 //!
-//! A shard is there whole or not at all. Failed trials are kept without their observations. `docs/dataset.md` has the columns.
+//! A file is there whole or not at all. Failed trials are kept without their observations. `docs/dataset.md` has the columns.
 
 mod check;
 mod columns;
 mod digest;
 mod read;
 mod write;
+mod writer;
 
-pub use digest::digest;
-pub use read::read_shard;
+pub use digest::{Digester, digest};
+pub use read::read_round;
+pub use writer::DatasetWriter;
 
-use crate::output::write_whole;
 use std::{
-    fs::{self, File, TryLockError},
-    io,
+    fs, io,
     path::{Path, PathBuf},
 };
 use vmao_core::record::TrialRecord;
@@ -40,7 +40,7 @@ pub enum DatasetError {
     /// No Parquet file, or one whose bytes have changed.
     #[error("{}: {message}", file.display())]
     Damaged {
-        /// The shard.
+        /// The file.
         file: PathBuf,
         /// What was found and expected.
         message: String,
@@ -48,7 +48,7 @@ pub enum DatasetError {
     /// A value that no trial can have.
     #[error("{}: row {row}, column {column}: {message}", file.display())]
     Value {
-        /// The shard.
+        /// The file.
         file: PathBuf,
         /// Row, from zero.
         row: usize,
@@ -57,9 +57,9 @@ pub enum DatasetError {
         /// What was found and expected.
         message: String,
     },
-    /// Shards that do not follow one another, or files that are no shards.
+    /// Rounds that do not follow one another, or files that are no rounds.
     #[error("{}: {message}", directory.display())]
-    Shards {
+    Rounds {
         /// The data set.
         directory: PathBuf,
         /// What was found and expected.
@@ -67,15 +67,29 @@ pub enum DatasetError {
     },
 }
 
-/// A finished round: the trials `first..=last` and their file.
+/// A file of finished trials: `first..=last`.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Shard {
+pub struct RoundFile {
     /// Index of its first trial.
     pub first: u64,
     /// Index of its last trial.
     pub last: u64,
     /// Its file.
     pub path: PathBuf,
+}
+
+impl RoundFile {
+    /// The file of the trials `first..=last` in a data set; it need not be there.
+    pub fn of(directory: &Path, first: u64, last: u64) -> Self {
+        Self { first, last, path: directory.join(round_name(first, last)) }
+    }
+}
+
+impl DatasetError {
+    /// Whether what is wrong is the file's content, which running its trials again would mend.
+    pub fn is_damage(&self) -> bool {
+        matches!(self, Self::Damaged { .. } | Self::Value { .. })
+    }
 }
 
 /// A record as it is stored: a failed trial keeps its contacts and poses, not what was seen.
@@ -88,113 +102,88 @@ pub fn stored(mut record: TrialRecord) -> TrialRecord {
     record
 }
 
-/// The finished shards of a data set, in trial order; refuses gaps, overlaps and stray names.
-pub fn shards(directory: &Path) -> Result<Vec<Shard>, DatasetError> {
-    let refuse = |message: String| DatasetError::Shards { directory: directory.to_owned(), message };
-    let mut shards = Vec::new();
+/// The files of finished trials in a directory, in trial order; refuses overlaps and stray names.
+pub fn found_files(directory: &Path) -> Result<Vec<RoundFile>, DatasetError> {
+    let refuse = |message: String| DatasetError::Rounds { directory: directory.to_owned(), message };
+    let mut files = Vec::new();
     for entry in fs::read_dir(directory).map_err(|source| io_error(directory, source))? {
         let path = entry.map_err(|source| io_error(directory, source))?.path();
         let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
-        if !name.starts_with("trials-") {
+        if !name.starts_with("trials-") || name == "trials.jsonl" {
             continue;
         }
         let range =
             name.strip_prefix("trials-").and_then(|name| name.strip_suffix(".parquet")).and_then(|name| name.split_once('-'));
         let numbers = range.and_then(|(first, last)| Some((first.parse().ok()?, last.parse().ok()?)));
         match numbers {
-            Some((first, last)) if first <= last && name == shard_name(first, last) => shards.push(Shard { first, last, path }),
-            _ => return Err(refuse(format!("file `{}`, expected names like {}", name.escape_debug(), shard_name(0, 15)))),
+            Some((first, last)) if first <= last && name == round_name(first, last) => {
+                files.push(RoundFile { first, last, path });
+            }
+            _ => return Err(refuse(format!("file `{}`, expected names like {}", name.escape_debug(), round_name(0, 15)))),
         }
     }
-    shards.sort_by_key(|shard| shard.first);
-    for pair in shards.windows(2) {
+    files.sort_by_key(|file| file.first);
+    for pair in files.windows(2) {
         if pair[1].first <= pair[0].last {
-            let (before, after) = (shard_name(pair[0].first, pair[0].last), shard_name(pair[1].first, pair[1].last));
+            let (before, after) = (round_name(pair[0].first, pair[0].last), round_name(pair[1].first, pair[1].last));
             return Err(refuse(format!("{before} and {after} overlap, expected each trial once")));
         }
-        if pair[1].first - 1 > pair[0].last {
-            return Err(refuse(format!("trials {} to {} are missing", pair[0].last + 1, pair[1].first - 1)));
-        }
     }
-    Ok(shards)
+    Ok(files)
 }
 
-fn shard_name(first: u64, last: u64) -> String {
+/// The rounds of a data set, in trial order from trial 0; refuses gaps, overlaps and stray names.
+pub fn round_files(directory: &Path) -> Result<Vec<RoundFile>, DatasetError> {
+    let files = found_files(directory)?;
+    let mut next = 0;
+    for file in &files {
+        if file.first != next {
+            let message = format!("trials {next} to {} are missing; `vmao explore --resume` runs them again", file.first - 1);
+            return Err(DatasetError::Rounds { directory: directory.to_owned(), message });
+        }
+        next = file.last.saturating_add(1);
+    }
+    Ok(files)
+}
+
+fn round_name(first: u64, last: u64) -> String {
     format!("trials-{first:08}-{last:08}.parquet")
+}
+
+/// The rounds of a data set one by one, from one run: no more than one is held at a time.
+pub fn rounds(directory: &Path) -> Result<impl Iterator<Item = Result<Vec<TrialRecord>, DatasetError>>, DatasetError> {
+    let mut run_seed = None;
+    Ok(round_files(directory)?.into_iter().map(move |file| {
+        let round = read_round(&file)?;
+        let seed = round.first().map(|record| record.seed);
+        if let (Some(before), Some(after)) = (run_seed, seed)
+            && before != after
+        {
+            let message = format!("seed {after}, expected {before} as in the files before");
+            return Err(DatasetError::Damaged { file: file.path, message });
+        }
+        run_seed = run_seed.or(seed);
+        Ok(round)
+    }))
 }
 
 /// All records of a data set in trial order, from one run; empty if there are none.
 pub fn load(directory: &Path) -> Result<Vec<TrialRecord>, DatasetError> {
-    let mut records: Vec<TrialRecord> = Vec::new();
-    for shard in shards(directory)? {
-        let more = read_shard(&shard)?;
-        if let (Some(before), Some(after)) = (records.last(), more.first())
-            && before.seed != after.seed
-        {
-            let message = format!("seed {}, expected {} as in the shards before", after.seed, before.seed);
-            return Err(DatasetError::Damaged { file: shard.path, message });
-        }
-        records.extend(more);
+    let mut records = Vec::new();
+    for round in rounds(directory)? {
+        records.extend(round?);
     }
     Ok(records)
 }
 
-/// A data set that this process alone writes, for as long as the value lives.
-#[derive(Debug)]
-pub struct DatasetWriter {
-    directory: PathBuf,
-    /// Held for its lock, which the system releases however the process ends.
-    _lock: File,
-}
-
-impl DatasetWriter {
-    /// Opens a data set for writing, made if need be; unfinished shards of a killed run are removed.
-    pub fn open(directory: &Path) -> Result<Self, DatasetError> {
-        fs::create_dir_all(directory).map_err(|source| io_error(directory, source))?;
-        let path = directory.join(".lock");
-        let lock = File::options().create(true).append(true).open(&path).map_err(|source| io_error(&path, source))?;
-        lock.try_lock().map_err(|error| match error {
-            TryLockError::WouldBlock => DatasetError::Locked { directory: directory.to_owned() },
-            TryLockError::Error(source) => io_error(&path, source),
-        })?;
-        for entry in fs::read_dir(directory).map_err(|source| io_error(directory, source))? {
-            let path = entry.map_err(|source| io_error(directory, source))?.path();
-            let name = path.file_name().unwrap_or_default().to_string_lossy();
-            if name.starts_with(".trials-") && name.ends_with(".parquet.partial") {
-                fs::remove_file(&path).map_err(|source| io_error(&path, source))?;
-            }
-        }
-        Ok(Self { directory: directory.to_owned(), _lock: lock })
+/// The digest of a data set, read one round at a time.
+pub fn digest_of(directory: &Path) -> Result<String, DatasetError> {
+    let trials = round_files(directory)?.last().map_or(0, |file| file.last + 1);
+    let mut digester = Digester::new(trials as usize);
+    for round in rounds(directory)? {
+        round?.iter().for_each(|record| digester.add(record));
     }
-
-    /// The finished rounds, for a resumed run to go on from.
-    pub fn shards(&self) -> Result<Vec<Shard>, DatasetError> {
-        shards(&self.directory)
-    }
-
-    /// Writes one round: consecutive trials of one seed. Once this returns, no crash loses them.
-    pub fn write_round(&self, records: &[TrialRecord]) -> Result<Shard, DatasetError> {
-        let refuse = |message: String| DatasetError::Shards { directory: self.directory.clone(), message };
-        let (Some(head), Some(tail)) = (records.first(), records.last()) else {
-            return Err(refuse("a round of no trials, expected at least one".to_owned()));
-        };
-        let (first, last) = (head.index, tail.index);
-        let path = self.directory.join(shard_name(first, last));
-        if path.exists() {
-            return Err(refuse(format!("{} is there already, expected a new round", shard_name(first, last))));
-        }
-        for (row, record) in records.iter().enumerate() {
-            if Some(record.index) != first.checked_add(row as u64) || record.seed != head.seed {
-                let message = format!("trial {} of seed {} in the round of {first} to {last}", record.index, record.seed);
-                return Err(refuse(format!("{message}, expected consecutive trials of seed {}", head.seed)));
-            }
-            check::record(record).map_err(|invalid| invalid.at(&path, row))?;
-        }
-        let stored: Vec<TrialRecord> = records.iter().cloned().map(stored).collect();
-        write_whole(&path, |file| write::shard(file, &stored).map_err(io::Error::other))
-            .map_err(|source| io_error(&path, source))?;
-        Ok(Shard { first, last, path })
-    }
+    Ok(digester.finish())
 }
 
 fn io_error(path: &Path, source: io::Error) -> DatasetError {

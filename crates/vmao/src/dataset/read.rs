@@ -1,7 +1,7 @@
 //! Parquet to records. The file may be damaged or made by anyone: every length and value is checked before it is used.
 
 use super::{
-    DatasetError, Shard,
+    DatasetError, RoundFile,
     check::{self, Invalid},
     columns::{DIGEST_KEY, SCHEMA_KEY, SCHEMA_VERSION, code_label, named_order, named_outcome, schema},
     digest::digest,
@@ -23,24 +23,24 @@ use vmao_core::{
     record::{GraspRecord, TrialRecord},
 };
 
-/// The most that one shard may hold when unpacked (bytes): a small file can claim to be anything.
+/// The most that one file may hold when unpacked (bytes): a small file can claim to be anything.
 const MAX_UNPACKED: i64 = 8 << 30;
-/// The most trials that one shard may hold.
+/// The most trials that one file may hold.
 const MAX_TRIALS: u64 = 1 << 20;
 /// Rows decoded at a time.
 const BATCH: usize = 64;
 
-/// The records of one shard, in trial order, checked against its name and its digest.
-pub fn read_shard(shard: &Shard) -> Result<Vec<TrialRecord>, DatasetError> {
+/// The records of one file, in trial order, checked against its name and its digest.
+pub fn read_round(file: &RoundFile) -> Result<Vec<TrialRecord>, DatasetError> {
     // NOTE: the Parquet decoder trusts page headers and panics on some that are damaged.
-    contained(|| decode(shard)).unwrap_or_else(|| {
+    contained(|| decode(file)).unwrap_or_else(|| {
         let message = "not a Parquet file that can be decoded".to_owned();
-        Err(DatasetError::Damaged { file: shard.path.clone(), message })
+        Err(DatasetError::Damaged { file: file.path.clone(), message })
     })
 }
 
-fn decode(shard: &Shard) -> Result<Vec<TrialRecord>, DatasetError> {
-    let file = &shard.path;
+fn decode(round: &RoundFile) -> Result<Vec<TrialRecord>, DatasetError> {
+    let file = &round.path;
     let damaged = |message: String| DatasetError::Damaged { file: file.clone(), message };
     let open = File::open(file).map_err(|source| DatasetError::Io { path: file.clone(), source })?;
     let options = ArrowReaderOptions::new().with_skip_arrow_metadata(true);
@@ -63,9 +63,9 @@ fn decode(shard: &Shard) -> Result<Vec<TrialRecord>, DatasetError> {
     if !(0..=MAX_UNPACKED).contains(&unpacked) {
         return Err(damaged(format!("{unpacked} bytes unpacked, expected at most {MAX_UNPACKED}")));
     }
-    let expected = shard.last.checked_sub(shard.first).and_then(|gap| gap.checked_add(1)).filter(|&count| count <= MAX_TRIALS);
+    let expected = round.last.checked_sub(round.first).and_then(|gap| gap.checked_add(1)).filter(|&count| count <= MAX_TRIALS);
     if u64::try_from(metadata.num_rows()).ok() != expected || expected.is_none() {
-        let (first, last) = (shard.first, shard.last);
+        let (first, last) = (round.first, round.last);
         return Err(damaged(format!("{} rows, expected trials {first} to {last} (at most {MAX_TRIALS})", metadata.num_rows())));
     }
 
@@ -74,7 +74,7 @@ fn decode(shard: &Shard) -> Result<Vec<TrialRecord>, DatasetError> {
         let batch = batch.map_err(|error| damaged(error.to_string()))?;
         for row in 0..batch.num_rows() {
             let number = records.len();
-            let index = shard.first.saturating_add(number as u64);
+            let index = round.first.saturating_add(number as u64);
             records.push(record(&batch, row, index).map_err(|invalid| invalid.at(file, number))?);
         }
     }

@@ -22,7 +22,7 @@ use std::{io::Write, sync::Arc};
 use vmao_core::record::{GraspRecord, TrialRecord};
 
 /// Writes the records of one round as one Parquet file with one row group.
-pub(super) fn shard(file: &mut (impl Write + Send), records: &[TrialRecord]) -> Result<(), ParquetError> {
+pub(super) fn round(file: &mut (impl Write + Send), records: &[TrialRecord]) -> Result<(), ParquetError> {
     let metadata = [(SCHEMA_KEY, SCHEMA_VERSION.to_owned()), (DIGEST_KEY, digest(records))];
     let metadata = metadata.map(|(key, value)| KeyValue::new(key.to_owned(), value)).to_vec();
     let mut properties = WriterProperties::builder()
