@@ -60,10 +60,9 @@ impl Coverage {
         let around = (-1..=1).flat_map(|x| (-1..=1).flat_map(move |y| (-1..=1).map(move |z| [x, y, z])));
         let neighbours = around.map(|[x, y, z]| [own[0] + x, own[1] + y, own[2] + z]);
         let distance = |cell: &Cell| (Vector3::from(cell.map(f64::from)).add_scalar(0.5) * CELL - point.coords).norm();
-        // The point's own cell has its middle nearest of all.
         let known = neighbours.filter(|cell| self.surface.contains(cell));
-        let nearest = known.min_by(|a, b| distance(a).total_cmp(&distance(b)));
-        self.touched.extend(nearest);
+        let nearest = || known.min_by(|a, b| distance(a).total_cmp(&distance(b)));
+        self.touched.extend(if self.surface.contains(&own) { Some(own) } else { nearest() });
     }
 
     /// Cells of the surface.
@@ -112,9 +111,9 @@ mod tests {
         assert!(inside.into_iter().all(|cell| !coverage.surface.contains(&cell)), "nothing inside");
         assert_eq!(coverage.touched(), 0);
         let all: Vec<Cell> = coverage.surface.iter().copied().collect();
-        coverage.touch(&Point3::new(0.0, 0.021, 0.0));
+        coverage.touch(&Point3::new(0.002, 0.021, 0.002));
         assert_eq!(coverage.touched(), 1);
-        coverage.touch(&Point3::new(0.0, 0.0209, 0.0005));
+        coverage.touch(&Point3::new(0.003, 0.0209, 0.001));
         assert_eq!(coverage.touched(), 1, "the same cell");
         coverage.touch(&Point3::new(1.0, 0.0, 0.0));
         assert_eq!(coverage.touched(), 1, "nowhere near");

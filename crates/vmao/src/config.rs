@@ -11,7 +11,7 @@ use crate::{
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 use vmao_core::{
-    catalogue::{CatalogueItem, InstanceSet},
+    catalogue::{self, CatalogueItem, InstanceSet},
     order::GraspOrder,
     osc::OscGains,
     robots::SLOTS,
@@ -182,6 +182,7 @@ impl Config {
         config.check().map_err(refuse)?;
         Inputs::resolve(&mut config)?;
         config.check_sizes().map_err(refuse)?;
+        config.check_demonstrations().map_err(refuse)?;
         Ok(config)
     }
 
@@ -244,6 +245,17 @@ impl Config {
             ensure(same, other, &format!("parts {found}"), &format!("those of {name}: {expected}"))?;
         }
         Ok(())
+    }
+
+    /// Refuses a file of demonstrations that is not of the object.
+    fn check_demonstrations(&self) -> Result<(), String> {
+        let name = &self.explore.demonstrations;
+        let Some(file) = self.inputs.demonstrations(name) else { return Ok(()) };
+        let known = self.inputs.object(&self.object.name).cloned();
+        let item = known.or_else(|| catalogue::item(&self.object.name, InstanceSet::Train, 0));
+        item.map_or(Ok(()), |item| {
+            file.tuples(&item).map(drop).map_err(|error| format!("explore.demonstrations: {name}: {error}"))
+        })
     }
 
     fn check(&self) -> Result<(), String> {

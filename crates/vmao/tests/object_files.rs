@@ -104,6 +104,7 @@ fn demonstrations_from_a_file_are_used_and_refused_by_name() {
     refuse(&|d| d["schema"] = json!(2), "schema 2, expected 1");
     refuse(&|d| d["demonstrations"][0]["grasps"][0]["fingers"] = json!(["left", "left"]), "coincide");
     refuse(&|d| d["extra"] = json!(1), "unknown field `extra`");
+    assert!(!here.join("run").exists(), "what is refused leaves nothing");
     explore(&good, None);
     let copies = fs::read_dir(here.join("run/inputs")).unwrap().count();
     assert_eq!(copies, 2, "the object and the demonstrations");

@@ -115,7 +115,9 @@ fn rays_meet_hulls_where_ours_do() {
     let eye = Point3::new(0.6, 0.3, 1.0);
     let mut hits = 0;
     for _ in 0..400 {
-        let target = parts[stream.index(2)] * Point3::from(normal(&mut stream) * 0.04);
+        let part = stream.index(2);
+        let solid = &scene.object.parts[part].solids[0];
+        let target = parts[part] * (solid.carrier_from_solid * solid.shape.centroid() + normal(&mut stream) * 0.03);
         let direction = Unit::new_normalize(target - eye);
         let passages =
             scene.object.parts.iter().zip(&parts).filter_map(|(part, at)| part.solids[0].passage(at, &eye, &direction));
