@@ -1,5 +1,4 @@
 //! What docs/dataset.md shows is run as it stands there.
-#![expect(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
 mod explorations;
 
