@@ -100,7 +100,7 @@ impl<'a> Evaluation<'a> {
 
     /// The cells that these trials make.
     pub fn results(&self, info: &RunInfo, lines: &[TrialLine]) -> Results {
-        let (object, robots) = (&self.config.object.name, &self.config.robots.names);
+        let (object, robots) = (self.config.object_name(), &self.config.robots.names);
         let mut cells = Vec::new();
         for &order in &self.config.evaluate.orders {
             for (method, _) in &self.methods {

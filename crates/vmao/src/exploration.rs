@@ -1,5 +1,6 @@
 //! Algorithm 1 on disk: rounds of trials that grow the label set, each kept for good before the next begins.
 
+use crate::acceptance::{Acceptance, AcceptanceSummary};
 use crate::config::Config;
 use crate::dataset::{DatasetWriter, Digester, RoundFile, read_round, stored};
 use crate::failure::{Failure, OrBadInput};
@@ -27,6 +28,16 @@ pub struct Explored {
     pub rate: f64,
     /// SHA-256 of the records in canonical order.
     pub digest: String,
+    /// Near-duplicates, failures and coverage; not known of a merged data set.
+    #[serde(flatten)]
+    pub acceptance: Option<AcceptanceSummary>,
+}
+
+/// What earlier trials have taught.
+#[derive(Debug)]
+pub struct Learned {
+    labels: LabelSet,
+    acceptance: Acceptance,
 }
 
 /// What the trials of a run take place in: all that (seed, index, label set) do not decide.
@@ -47,18 +58,23 @@ impl<'a> Explorer<'a> {
     }
 
     /// T ← D.
-    pub fn demonstrated(&self) -> LabelSet {
-        LabelSet::demonstrated(&self.scenes)
+    pub fn demonstrated(&self) -> Learned {
+        let acceptance = Acceptance::new(&self.config.explore, &self.scenes);
+        Learned { labels: LabelSet::demonstrated(&self.scenes), acceptance }
     }
 
-    /// T ← T ∪ {s′}.
-    pub fn learn(&self, labels: &mut LabelSet, record: &TrialRecord) {
-        labels.learn(scene_of_trial(self.seed, record.index, self.scenes.len()), record);
+    /// T ← T ∪ {s′}, unless s′ is a near-duplicate that is to be left out.
+    pub fn learn(&self, learned: &mut Learned, record: &TrialRecord) {
+        let scene = scene_of_trial(self.seed, record.index, self.scenes.len());
+        if learned.acceptance.add(scene, record) {
+            learned.labels.learn(scene, record);
+        }
     }
 
     /// Runs these trials of one round in the current rayon pool, as they are stored.
-    pub fn run(&self, labels: &LabelSet, indices: &[u64], done: &(dyn Fn(&Trial) + Sync)) -> Vec<TrialRecord> {
-        let trials = explore_round(&self.scenes, &self.trial_config, labels, &self.proposals, (self.seed, indices), done);
+    pub fn run(&self, learned: &Learned, indices: &[u64], done: &(dyn Fn(&Trial) + Sync)) -> Vec<TrialRecord> {
+        let (labels, proposals) = (&learned.labels, &self.proposals);
+        let trials = explore_round(&self.scenes, &self.trial_config, labels, proposals, (self.seed, indices), done);
         trials.into_iter().map(|trial| stored(trial.record)).collect()
     }
 
@@ -91,23 +107,23 @@ pub fn explore(
     if shared.is_none() {
         check_rounds(config, writer)?;
     }
-    let mut labels = explorer.demonstrated();
+    let mut learned = explorer.demonstrated();
     let (mut trials, mut successes) = (0, 0);
     let bar = progress_bar("explore", config.explore.successes);
     while let Some(indices) = explorer.next_round(trials, successes) {
         keeps(rounds.kept(trials, successes));
         bar.set_position(successes.min(config.explore.successes));
-        let tried = AtomicU64::new(trials);
+        let (tried, so_far) = (AtomicU64::new(trials), learned.acceptance.words());
         let done = |trial: &Trial| {
             let tried = tried.fetch_add(1, Ordering::Relaxed) + 1;
             if trial.record.outcome.is_success() {
                 bar.inc(1);
             }
-            bar.set_prefix(format!("{tried} trials, {:.0} % accepted", 100.0 * bar.position() as f64 / tried as f64));
+            bar.set_prefix(format!("{tried} trials, {:.0} % accepted, {so_far}", 100.0 * bar.position() as f64 / tried as f64));
         };
-        let round = rounds.obtain(&indices, &|indices| explorer.run(&labels, indices, &done))?;
+        let round = rounds.obtain(&indices, &|indices| explorer.run(&learned, indices, &done))?;
         for record in &round {
-            explorer.learn(&mut labels, record);
+            explorer.learn(&mut learned, record);
             successes += u64::from(record.outcome.is_success());
         }
         trials = indices.end;
@@ -118,7 +134,8 @@ pub fn explore(
         let indices = first..first.saturating_add(config.explore.round_size).min(trials);
         rounds.read(&indices)?.iter().for_each(|record| digester.add(record));
     }
-    Ok(Explored { trials, successes, rate: successes as f64 / trials.max(1) as f64, digest: digester.finish() })
+    let (rate, acceptance) = (successes as f64 / trials.max(1) as f64, Some(learned.acceptance.summary()));
+    Ok(Explored { trials, successes, rate, digest: digester.finish(), acceptance })
 }
 
 /// Where finished rounds are: all in one directory, or each round shared out over several.

@@ -2,15 +2,18 @@
 //!
 //! It knows files and people; the simulator's pointers and the network's tensors stay in their own crates.
 
+pub mod acceptance;
 pub mod commands;
 pub mod config;
 mod config_layers;
 mod contact_maps;
 pub mod dataset;
+pub mod demonstrations;
 pub mod evaluation;
 pub mod exploration;
 pub mod failure;
 pub mod ik;
+pub mod inputs;
 pub mod interruption;
 pub mod json;
 mod json_place;

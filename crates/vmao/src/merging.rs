@@ -79,7 +79,8 @@ impl Pieces {
         for file in &kept {
             read_round(file)?.iter().for_each(|record| digester.add(record));
         }
-        Ok(Explored { trials, successes, rate: successes as f64 / trials.max(1) as f64, digest: digester.finish() })
+        let rate = successes as f64 / trials.max(1) as f64;
+        Ok(Explored { trials, successes, rate, digest: digester.finish(), acceptance: None })
     }
 
     /// The records of a round; trials that several shards ran must be the same.

@@ -37,7 +37,7 @@ pub fn write_report(directory: &Path) -> Result<PathBuf, Failure> {
     let evaluation = Evaluation::new(&config, info.seed, load_methods(&models, &config)?)?;
     let (exploration, digest) = explored(&config, &directory.join("data"))?;
     let data = ReportData {
-        title: format!("vmao · {} with {}", config.object.name, config.robots.names.join(" + ")),
+        title: format!("vmao · {} with {}", config.object_name(), config.robots.names.join(" + ")),
         summary: summary(&results),
         cells: cells(&results, &lines)?,
         contact_maps: contact_maps(&evaluation, &lines, info.seed)?,

@@ -125,7 +125,7 @@ fn show(directory: &Path, trial: u64, session: &Session) -> Result<(), Failure> 
     let rollout = again.rollout.unwrap_or_default();
     let caption = format!("{} order, {} steps.{why}", record.order.name(), record.steps);
     let data = ReportData {
-        title: format!("vmao · {} with {} · trial {trial}", config.object.name, config.robots.names.join(" + ")),
+        title: format!("vmao · {} with {} · trial {trial}", config.object_name(), config.robots.names.join(" + ")),
         summary: format!("Trial {trial} of {}, {what}; run again from its record, equal bit for bit.", directory.display()),
         rollouts: vec![RolloutFigure { title, caption, rollout }],
         provenance: Provenance {

@@ -90,7 +90,7 @@ pub(super) fn run(arguments: &SampleArguments, session: &Session) -> Result<(), 
     }
     let info = &session.info;
     let data = ReportData {
-        title: format!("vmao · contact maps of {}", session.config.object.name),
+        title: format!("vmao · contact maps of {}", session.config.object_name()),
         summary: format!("{} maps of {} scenes by {}.", written.len(), figures.len(), method.title()),
         contact_maps: figures,
         provenance: Provenance {
