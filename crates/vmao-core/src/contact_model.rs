@@ -19,10 +19,16 @@ pub struct ContactQuery<'a> {
     pub world_from_part: &'a Pose,
 }
 
+/// World points for finger 1 and finger 2 (m).
+pub type FingerPoints = [Point3<f64>; 2];
+
 /// Proposes where the two fingers of the next grasp shall touch.
 pub trait ContactModel: Sync {
-    /// World points for finger 1 and finger 2, or `None` if the model sees nowhere to touch.
-    fn propose(&self, query: &ContactQuery<'_>, stream: &mut Stream) -> Option<[Point3<f64>; 2]>;
+    /// What the trial shall try, best first; nothing if the model sees nowhere to touch.
+    ///
+    /// The trial takes the first proposal that a gripper can reach and carry. A model that is to be judged by one sample, as in
+    /// the paper, makes one.
+    fn propose(&self, query: &ContactQuery<'_>, stream: &mut Stream) -> Vec<FingerPoints>;
 }
 
 /// Algorithm 1's proposal: each point of a known tuple, moved to a random cloud point of the same part nearby.
@@ -35,7 +41,13 @@ pub struct JitteredTuple {
 }
 
 impl ContactModel for JitteredTuple {
-    fn propose(&self, query: &ContactQuery<'_>, stream: &mut Stream) -> Option<[Point3<f64>; 2]> {
+    fn propose(&self, query: &ContactQuery<'_>, stream: &mut Stream) -> Vec<FingerPoints> {
+        self.jittered(query, stream).into_iter().collect()
+    }
+}
+
+impl JitteredTuple {
+    fn jittered(&self, query: &ContactQuery<'_>, stream: &mut Stream) -> Option<FingerPoints> {
         let contact = self.tuple.iter().find(|contact| contact.part == query.part)?;
         let mut fingers = [Point3::origin(); 2];
         for (finger, point) in fingers.iter_mut().zip(&contact.fingers) {
@@ -75,8 +87,8 @@ fn neighbour(
 pub struct FixedTuple(pub ContactTuple);
 
 impl ContactModel for FixedTuple {
-    fn propose(&self, query: &ContactQuery<'_>, _stream: &mut Stream) -> Option<[Point3<f64>; 2]> {
-        let contact = self.0.iter().find(|contact| contact.part == query.part)?;
-        Some(contact.fingers.map(|point| query.world_from_part * point))
+    fn propose(&self, query: &ContactQuery<'_>, _stream: &mut Stream) -> Vec<FingerPoints> {
+        let contact = self.0.iter().find(|contact| contact.part == query.part);
+        contact.map(|contact| contact.fingers.map(|point| query.world_from_part * point)).into_iter().collect()
     }
 }

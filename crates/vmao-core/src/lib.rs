@@ -4,6 +4,7 @@
 //! contacts, grasp orders and outcomes. This crate knows nothing of the simulator, of tensors, of files,
 //! of the clock or of threads.
 
+pub mod antipodal;
 pub mod catalogue;
 pub mod collision;
 mod collision_checker;
@@ -11,6 +12,7 @@ pub mod contact;
 pub mod contact_model;
 pub mod convex_hull;
 mod coordination;
+pub mod coverage;
 mod damped_least_squares;
 pub mod depth_noise;
 pub mod depth_picture;
@@ -29,6 +31,7 @@ pub mod observation;
 pub mod order;
 pub mod osc;
 pub mod outcome;
+pub mod passage;
 pub mod planning;
 pub mod planning_problems;
 pub mod random;

@@ -18,7 +18,7 @@ pub enum FailureStage {
     Slip,
     /// Everything held, but the object ended outside the thresholds.
     Threshold,
-    /// The budget of simulated steps ended first.
+    /// The simulation did not come to its end: its steps were spent, or the simulator went astray.
     Timeout,
 }
 
@@ -39,6 +39,19 @@ impl FailureStage {
             Self::Timeout => "timeout",
         }
     }
+}
+
+/// Whether the arms can hold all parts at the start of a trial and at its goal, whoever chooses the contacts.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Default, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Reachability {
+    /// Every part has an arm of its own with joint positions for one grasp at the start and at the goal.
+    Reachable,
+    /// It is proven for every grasp looked at that no choice of arms has joint positions for all parts.
+    Unreachable,
+    /// Neither was found.
+    #[default]
+    Unknown,
 }
 
 /// How a trial ended.

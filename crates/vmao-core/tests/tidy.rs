@@ -183,6 +183,23 @@ fn one_file_converts_quaternions_and_one_runs_trials(files: &[File]) -> Vec<Stri
     complaints
 }
 
+/// Labels say what a point lies on: they are for exploration and analysis, and a network that saw them would know its answer.
+fn no_network_sees_labels(files: &[File]) -> Vec<String> {
+    let learns = |path: &str| {
+        path.starts_with("crates/vmao-net/src/")
+            || ["learning.rs", "learned_contacts.rs"].iter().any(|name| path == format!("crates/vmao/src/{name}"))
+    };
+    let mut complaints = Vec::new();
+    for file in files.iter().filter(|file| learns(&file.path)) {
+        for (line, text) in (1..).zip(file.text.lines()) {
+            if text.contains("PointLabel") || text.contains("observation.labels") {
+                complaints.push(format!("{}:{line}: labels of points are not for networks", file.path));
+            }
+        }
+    }
+    complaints
+}
+
 /// What a line of Markdown says between backticks, and the targets of its links.
 fn mentions(line: &str) -> (Vec<&str>, Vec<&str>) {
     let code = line.split('`').skip(1).step_by(2).collect();
@@ -302,10 +319,11 @@ fn deviations_are_numbered_and_explained(files: &[File]) -> Vec<String> {
     complaints
 }
 
-const RULES: [(&str, Rule); 8] = [
+const RULES: [(&str, Rule); 9] = [
     ("walls between crates", crates_depend_on_no_more_than_they_may),
     ("what core may use", core_opens_no_file_clock_or_thread),
     ("one place for each thing", one_file_converts_quaternions_and_one_runs_trials),
+    ("what networks see", no_network_sees_labels),
     ("paths in documents", documents_name_what_exists),
     ("length of files", no_source_is_too_long),
     ("nothing undone", nothing_is_left_undone),
@@ -353,6 +371,13 @@ fn things_out_of_their_one_place_are_found() {
     breaks(rule, "crates/vmao-sim/src/b.rs", "\n\ndata.xquat()", "b.rs:3: `xquat`: belongs in crates/vmao-sim/src/convention.rs");
     breaks(rule, "crates/vmao/src/b.rs", "pub fn run_trial() {}\npub fn run_trial(", "b.rs:2: `pub fn run_trial(`");
     breaks(rule, "none", "", "convention.rs:1: `xquat` is not there");
+    breaks(
+        no_network_sees_labels,
+        "crates/vmao-net/src/a.rs",
+        "\nuse b::PointLabel;",
+        "a.rs:2: labels of points are not for networks",
+    );
+    breaks(no_network_sees_labels, "crates/vmao/src/learning.rs", "seen.observation.labels", "learning.rs:1: labels");
 }
 
 #[test]

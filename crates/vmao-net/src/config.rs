@@ -14,6 +14,27 @@ pub enum ModelKind {
     Top1,
 }
 
+impl ModelKind {
+    /// All kinds.
+    pub const ALL: [Self; 2] = [Self::Vmao, Self::Top1];
+
+    /// The name in documents, and of a checkpoint's directory.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Vmao => "vmao",
+            Self::Top1 => "top1",
+        }
+    }
+
+    /// The name for people.
+    pub fn title(self) -> &'static str {
+        match self {
+            Self::Vmao => "V-MAO",
+            Self::Top1 => "Top-1",
+        }
+    }
+}
+
 /// One set-abstraction layer (PointNet++).
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]

@@ -41,11 +41,11 @@ fn main() -> Result<(), Box<dyn Error>> {
     std::fs::write(Path::new(folder).join("scene.xml"), &scene.mjcf)?;
     let depths = (0..still.cameras.len()).flat_map(|camera| still.depths(camera));
     std::fs::write(Path::new(folder).join("depths.bin"), depths.flat_map(f64::to_le_bytes).collect::<Vec<u8>>())?;
-    let (mut points, before) = (0, thread_seconds());
+    let (mut points, before) = (0, support::thread_seconds());
     for _ in 0..frames.parse::<usize>()? {
         points += (0..still.cameras.len()).map(|camera| still.look(camera)).sum::<usize>();
     }
-    let seconds = thread_seconds() - before;
+    let seconds = support::thread_seconds() - before;
     let cameras: Vec<String> = still.cameras.iter().map(described).collect();
     println!(
         r#"{{"seconds": {seconds}, "points": {points}, "width": {}, "height": {}, "half_tangent": {}, "qpos": {:?}, "cameras": [{}]}}"#,
@@ -63,10 +63,4 @@ fn described(camera: &Pinhole) -> String {
     let rotation = camera.world_from_camera.rotation.to_rotation_matrix();
     let axes: Vec<Vec<f64>> = (0..3).map(|axis| rotation.matrix().column(axis).iter().copied().collect()).collect();
     format!(r#"{{"position": {:?}, "axes": {axes:?}}}"#, camera.world_from_camera.translation.vector.as_slice())
-}
-
-/// CPU time of the calling thread (s), as Linux counts it.
-fn thread_seconds() -> f64 {
-    let text = std::fs::read_to_string("/proc/thread-self/schedstat").unwrap_or_default();
-    text.split_whitespace().next().and_then(|nanoseconds| nanoseconds.parse::<f64>().ok()).unwrap_or(f64::NAN) * 1e-9
 }

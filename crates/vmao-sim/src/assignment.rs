@@ -32,7 +32,7 @@ pub(crate) fn assignments(scene: &Scene, held: &[(ArmId, PartId)], places: &[&[P
 }
 
 /// Calls `visit` with every way to choose `places` of `0..count` in an order, lexicographically.
-fn arrangements(count: usize, places: usize, visit: &mut dyn FnMut(&[usize])) {
+pub(crate) fn arrangements(count: usize, places: usize, visit: &mut dyn FnMut(&[usize])) {
     fn extend(chosen: &mut Vec<usize>, count: usize, places: usize, visit: &mut dyn FnMut(&[usize])) {
         if chosen.len() == places {
             return visit(chosen);

@@ -3,7 +3,7 @@
 use crate::assignment::assignments;
 use crate::cameras::observe;
 use crate::combinations::{Choices, Reserve, compatible_grasps, free_alone, joint_positions_with};
-use crate::dependency_root::{choose, grasp_sequence, step_goal};
+use crate::dependency_root::{choose_root, grasp_sequence, step_goal};
 use crate::failure::Failure;
 use crate::grasping::{Grasp, GraspConfig, object_cloud, reachable_grasps};
 use crate::measures::Measuring;
@@ -12,15 +12,15 @@ use crate::profile::{Stage, time};
 use crate::recorder::Recorder;
 use crate::scene::Scene;
 use crate::simulation::{Grip, Simulation};
-use crate::task::{goal_errors, sample_goal, sample_start};
+use crate::targets::Targets;
+use crate::task::{GoalReach, draw_goal, goal_errors, sample_start};
 use crate::trial::{Recording, Trial, TrialConfig};
 use nalgebra::Point3;
 use std::ops::Range;
 use vmao_core::contact::{ArmId, Contact, PartId};
-use vmao_core::contact_model::{ContactModel, ContactQuery};
+use vmao_core::contact_model::{ContactModel, ContactQuery, FingerPoints};
 use vmao_core::geometry::{Pose, interpolate};
 use vmao_core::object::{ObjectGoal, ObjectState};
-use vmao_core::object_centric::part_poses;
 use vmao_core::object_graph::ObjectGraph;
 use vmao_core::order::GraspOrder;
 use vmao_core::outcome::{FailureStage, TrialOutcome};
@@ -31,7 +31,7 @@ use vmao_core::time_parameterization::{MotionLimits, Trajectory};
 
 /// Random streams of a trial, each its own so that two methods meet the same scene and goal.
 #[derive(Clone, Copy)]
-enum Draw {
+pub(crate) enum Draw {
     Start = 0,
     Goal,
     Look,
@@ -65,19 +65,21 @@ pub(crate) struct Attempt<'a> {
     seed: u64,
     index: u64,
     /// The parts in the order in which they are grasped.
-    sequence: Vec<PartId>,
+    pub(crate) sequence: Vec<PartId>,
     /// Which arm grasps each part.
-    arms: Vec<ArmId>,
+    pub(crate) arms: Vec<ArmId>,
     start: ObjectState,
     pub(crate) goal: ObjectGoal,
     pub(crate) goal_parts: Vec<Pose>,
+    reach: GoalReach,
     pub(crate) held: Vec<(ArmId, PartId)>,
-    grasps: Vec<GraspRecord>,
+    pub(crate) grasps: Vec<GraspRecord>,
     pub(crate) errors: [f64; 4],
     /// Worst ratio of error to threshold while the goal was to be held.
     pub(crate) factor: f64,
     /// How the motions of the object went with all parts held.
     pub(crate) measuring: Measuring,
+    settled: Result<(), Failure>,
 }
 
 impl<'a> Attempt<'a> {
@@ -92,18 +94,22 @@ impl<'a> Attempt<'a> {
         let draw = |draw: Draw| Stream::new(seed, &[index, draw as u64]);
         let (world_from_root, joints) = sample_start(scene, &config.start, &mut draw(Draw::Start));
         let mut simulation = Simulation::new(scene, config.osc, &world_from_root, &joints);
+        if recording == Recording::Targets {
+            simulation.targets = Some(Targets::new(&simulation));
+        }
+        simulation.max_steps = config.motion.max_steps;
+        let mut settled = Ok(());
         for tick in 0..(SETTLE_SECONDS / scene.timestep) as usize {
-            simulation.tick();
-            if tick > 50 && simulation.object_speed() < REST_SPEED {
+            settled = simulation.advance();
+            if settled.is_err() || tick > 50 && simulation.object_speed() < REST_SPEED {
                 break;
             }
         }
         let graph = scene.graph.clone();
         let start = simulation.object_state();
         // Drawn as a motion of part 0 whatever the root, so that all roots meet the same goals.
-        let drawn = sample_goal(scene, &config.goal, &start, &mut draw(Draw::Goal));
-        let goal_parts = part_poses(&scene.object, &graph, drawn.root, &drawn.world_from_root, &drawn.joint_positions);
-        let root = choose(scene, &config.motion, order, &start, &drawn);
+        let (drawn, goal_parts, reach) = draw_goal(scene, (&config.goal, &config.grasp), &start, &mut draw(Draw::Goal));
+        let root = choose_root(scene, config, order, &start, &drawn);
         let goal = drawn.with_root(&scene.object, &graph, root);
         let sequence = grasp_sequence(&graph, goal.root, order);
         if recording == Recording::On {
@@ -125,12 +131,19 @@ impl<'a> Attempt<'a> {
             start,
             goal,
             goal_parts,
+            reach,
             held,
             grasps,
             errors,
             factor: f64::INFINITY,
             measuring: Measuring::default(),
+            settled,
         }
+    }
+
+    /// Whether the object came to lie on the table.
+    pub(crate) fn settled(&self) -> Result<(), Failure> {
+        self.settled.clone()
     }
 
     /// Number of parts to take hold of.
@@ -138,7 +151,7 @@ impl<'a> Attempt<'a> {
         self.scene.object.parts.len()
     }
 
-    fn stream(&self, draw: Draw) -> Stream {
+    pub(crate) fn stream(&self, draw: Draw) -> Stream {
         Stream::new(self.seed, &[self.index, draw as u64, self.held.len() as u64])
     }
 
@@ -160,7 +173,7 @@ impl<'a> Attempt<'a> {
         &mut self,
         model: &dyn ContactModel,
         step: Range<usize>,
-    ) -> Result<Vec<[Point3<f64>; 2]>, Failure> {
+    ) -> Result<Vec<Vec<FingerPoints>>, Failure> {
         let mut stream = self.stream(Draw::Look);
         let held = self.held.len() as u64;
         let noise = |camera| Stream::new(self.seed, &[self.index, Draw::Noise as u64, held, camera as u64]);
@@ -172,10 +185,13 @@ impl<'a> Attempt<'a> {
             let world_from_part = state.world_from_parts[usize::from(part.0)];
             let query = ContactQuery { grasp, part, observation: &observation, world_from_part: &world_from_part };
             let mut stream = Stream::new(self.seed, &[self.index, Draw::Contacts as u64, grasp as u64]);
-            let fingers = time(Stage::Proposal, || model.propose(&query, &mut stream))
-                .ok_or_else(|| Failure::new(FailureStage::NoContact, format!("nothing to touch was seen on part {}", part.0)))?;
-            if fingers.iter().flat_map(|point| point.iter()).any(|value| !value.is_finite()) {
-                let why = format!("the points proposed on part {} are not finite: {} and {}", part.0, fingers[0], fingers[1]);
+            let proposals = time(Stage::Proposal, || model.propose(&query, &mut stream));
+            let Some(&fingers) = proposals.first() else {
+                let why = format!("nothing to touch was seen on part {}", part.0);
+                return Err(Failure::new(FailureStage::NoContact, why));
+            };
+            if let Some(odd) = proposals.iter().find(|fingers| fingers.iter().flat_map(|p| p.iter()).any(|x| !x.is_finite())) {
+                let why = format!("the points proposed on part {} are not finite: {} and {}", part.0, odd[0], odd[1]);
                 return Err(Failure::new(FailureStage::NoContact, why));
             }
             let contact = Contact { part, fingers: fingers.map(|point| world_from_part.inverse_transform_point(&point)) };
@@ -185,7 +201,7 @@ impl<'a> Attempt<'a> {
             if let Some(recorder) = &mut self.simulation.recorder {
                 recorder.contact(steps, arm.0, &fingers);
             }
-            contacts.push(fingers);
+            contacts.push(proposals);
         }
         Ok(contacts)
     }
@@ -193,7 +209,7 @@ impl<'a> Attempt<'a> {
     /// Gripper poses for these contacts that all arms reach, carry to the step's goal, and take without meeting; best first.
     ///
     /// Arms are assigned to parts by distance; the other way round only if that leaves no way, now or for later grasps.
-    pub(crate) fn choose_grasps(&mut self, contacts: &[[Point3<f64>; 2]]) -> Result<Vec<Vec<Grasp>>, Failure> {
+    pub(crate) fn choose_grasps(&mut self, contacts: &[FingerPoints]) -> Result<Vec<Vec<Grasp>>, Failure> {
         let mut stream = self.stream(Draw::Reach);
         let now = self.simulation.object_state().world_from_parts;
         let mut crowded = Err(Failure::new(FailureStage::NoPlan, "no arm is free"));
@@ -209,20 +225,29 @@ impl<'a> Attempt<'a> {
     }
 
     /// The combinations of grasps on these contacts that the arms can make if part p is taken by `arms[p]`.
-    fn choices(&self, arms: &[ArmId], contacts: &[[Point3<f64>; 2]], stream: &mut Stream) -> Result<Choices, Failure> {
+    fn choices(&self, arms: &[ArmId], contacts: &[FingerPoints], stream: &mut Stream) -> Result<Choices, Failure> {
         let (first, config) = (self.held.len(), &self.config.grasp);
         let cloud = object_cloud(&self.grasps[first].observation);
         let holders = self.holders();
         let motion = self.waypoints(&self.trajectory(self.step_goal(first + contacts.len())));
         let mut candidates = Vec::new();
-        for (grasp, fingers) in contacts.iter().enumerate() {
-            let part = self.sequence[first + grasp];
-            let arm = arms[usize::from(part.0)];
-            let reached = reachable_grasps(&self.simulation, config, (arm, part), (&cloud, fingers), &motion, stream)?;
-            candidates.push(free_alone(&self.simulation, config, &holders, &motion[0], reached));
+        for (&part, fingers) in self.sequence[first..].iter().zip(contacts) {
+            candidates.push(self.within_reach((arms[usize::from(part.0)], part), (&cloud, fingers), &motion, stream)?);
         }
         let reserve = self.reserve(arms, first + contacts.len(), &motion, stream);
         compatible_grasps(&self.simulation, config, &candidates, &holders, &reserve)
+    }
+
+    /// The grasps of `part` at these points that `arm` can make and carry as far as it alone is concerned.
+    pub(crate) fn within_reach(
+        &self,
+        (arm, part): (ArmId, PartId),
+        touch: (&[Point3<f64>], &FingerPoints),
+        motion: &[Vec<Pose>],
+        stream: &mut Stream,
+    ) -> Result<Vec<Grasp>, Failure> {
+        let reached = reachable_grasps(&self.simulation, &self.config.grasp, (arm, part), touch, motion, stream)?;
+        Ok(free_alone(&self.simulation, &self.config.grasp, &self.holders(), &motion[0], reached))
     }
 
     /// How the parts that are grasped from `next` on could be taken where the object is after `motion`: as demonstrated, on average.
@@ -385,6 +410,7 @@ impl<'a> Attempt<'a> {
             };
             rollout
         });
+        let targets = self.simulation.targets.take();
         let (index, seed, order, start, goal, grasps) = (self.index, self.seed, self.order, self.start, self.goal, self.grasps);
         let record = TrialRecord { index, seed, order, start, goal, grasps, outcome, detail, steps, final_errors: self.errors };
         let got_so_far = matches!(outcome, TrialOutcome::Success | TrialOutcome::Failed(FailureStage::Threshold));
@@ -392,7 +418,9 @@ impl<'a> Attempt<'a> {
             record,
             threshold_factor: if got_so_far { self.factor } else { f64::INFINITY },
             rollout,
+            targets,
             motion: self.measuring.finish(),
+            reach: self.reach,
         }
     }
 }

@@ -1,10 +1,11 @@
 //! The one place where MuJoCo's conventions meet ours: quaternion order, twist order, array layouts.
 
 use mujoco_rs::wrappers::mj_data::MjData;
+use mujoco_rs::wrappers::mj_logging::{log_config, set_log_config};
 use mujoco_rs::wrappers::mj_model::MjModel;
 use nalgebra::{Matrix3, UnitQuaternion, Vector3};
 use std::fmt::Write;
-use std::sync::Arc;
+use std::sync::{Arc, Once};
 use vmao_core::convex_hull::ConvexHull;
 use vmao_core::geometry::{Pose, pose, position_quaternion};
 use vmao_core::osc::{Jacobian, JointVector, MassMatrix};
@@ -13,6 +14,36 @@ use vmao_core::shape::Shape;
 
 /// The simulator's state type used throughout this crate.
 pub(crate) type Data = MjData<Arc<MjModel>>;
+
+static QUIET: Once = Once::new();
+
+/// The compiled model of a scene; the simulator's words if it refuses.
+///
+/// The simulator's warnings are read from its state ([`warning`]), so it shall not also write them to a file of its own.
+#[expect(unsafe_code, reason = "the simulator's log is a global of the library")]
+pub(crate) fn compile(mjcf: &str) -> Result<MjModel, String> {
+    QUIET.call_once(|| {
+        // SAFETY: every use of the simulator begins with a model from here, and all callers wait for this first one.
+        unsafe { set_log_config(log_config().with_logto_file(false)) }
+    });
+    MjModel::from_xml_string(mjcf).map_err(|cause| cause.to_string())
+}
+
+/// What the simulator has warned of since its state was made: a step that counts for nothing.
+pub(crate) fn warning(data: &Data) -> Option<String> {
+    // In the order of mjtWarning.
+    const NAMES: [&str; 7] = [
+        "an inertia that cannot be inverted",
+        "more contacts than there is room for",
+        "more constraints than there is room for",
+        "a position that is not finite or too large",
+        "a velocity that is not finite or too large",
+        "an acceleration that is not finite or too large",
+        "a torque that is not finite",
+    ];
+    let raised = data.warning().iter().zip(NAMES).find(|(warning, _)| warning.number > 0);
+    raised.map(|(warning, name)| format!("{name} (number {})", warning.lastinfo))
+}
 
 /// World pose of body `body`.
 pub(crate) fn body_pose(data: &Data, body: usize) -> Pose {

@@ -32,6 +32,8 @@ pub struct MotionConfig {
     pub collision_force: f64,
     /// Waypoints at which a motion of the object is planned.
     pub waypoints: usize,
+    /// Simulated steps that a trial may take.
+    pub max_steps: u64,
 }
 
 impl MotionConfig {
@@ -61,9 +63,13 @@ const HOLD_TICKS: u32 = 25;
 impl Simulation<'_> {
     /// Lets time pass with all goals as they are.
     pub(crate) fn wait(&mut self, seconds: f64) {
-        for _ in 0..(seconds / self.scene.timestep).round() as u64 {
+        for _ in 0..self.ticks(seconds) {
             self.tick();
         }
+    }
+
+    fn ticks(&self, seconds: f64) -> u64 {
+        (seconds / self.scene.timestep).round() as u64
     }
 
     /// Follows a joint trajectory of all arms (flat) to its end; arms not in `moving` keep their goals.
@@ -88,7 +94,7 @@ impl Simulation<'_> {
                     *goal = gripper_goal(&seen[part], &now[part], goal);
                 }
             }
-            self.tick();
+            self.advance()?;
             if self.steps.is_multiple_of(WATCH_EVERY) {
                 self.watch_collisions(moving, motion)?;
             }
@@ -117,11 +123,13 @@ impl Simulation<'_> {
             self.goals[arm].twist = Vector6::zeros();
             self.grips[arm] = Grip::Close(config.closing_force);
         }
-        self.wait(config.closing_seconds);
+        for _ in 0..self.ticks(config.closing_seconds) {
+            self.advance()?;
+        }
         // Contacts of stiff bodies come and go from one tick to the next: what counts is the mean over a moment.
         let mut pads = vec![[0.0; 2]; grasps.len()];
         for _ in 0..HOLD_TICKS {
-            self.tick();
+            self.advance()?;
             for (pads, grasp) in pads.iter_mut().zip(grasps) {
                 let touch = self.touch(grasp.arm, grasp.part);
                 pads[0] += touch.pads[0] / f64::from(HOLD_TICKS);
@@ -161,7 +169,7 @@ impl Simulation<'_> {
                 goal.posture = posture_at(postures, time / trajectory.duration());
             }
             wanted = next;
-            self.tick();
+            self.advance()?;
             at_tick(self, time);
             if self.steps.is_multiple_of(WATCH_EVERY) {
                 self.watch_collisions(held, motion)?;

@@ -6,7 +6,6 @@
 use crate::scene::Scene;
 use crate::trial::{Recording, Trial, TrialConfig, run_trial};
 use rayon::prelude::*;
-use std::ops::Range;
 use vmao_core::contact::ContactTuple;
 use vmao_core::contact_model::JitteredTuple;
 use vmao_core::order::GraspOrder;
@@ -67,7 +66,7 @@ pub struct Proposals {
     pub orders: Vec<GraspOrder>,
 }
 
-/// Runs the trials `indices` with the label set frozen, in the current rayon pool; results in index order.
+/// Runs the trials `indices` with the label set frozen, in the current rayon pool; results in the order asked for.
 ///
 /// Trial i draws its scene, its tuple and all else from (`seed`, i).
 pub fn explore_round(
@@ -75,10 +74,10 @@ pub fn explore_round(
     config: &TrialConfig,
     labels: &LabelSet,
     proposals: &Proposals,
-    (seed, indices): (u64, Range<u64>),
+    (seed, indices): (u64, &[u64]),
     done: &(dyn Fn(&Trial) + Sync),
 ) -> Vec<Trial> {
-    let run = |index: u64| {
+    let run = |&index: &u64| {
         let scene = scene_of_trial(seed, index, scenes.len());
         let tuple = labels.draw(scene, &mut Stream::new(seed, &[index, TUPLE]));
         let Proposals { radius, orders } = proposals;
@@ -88,5 +87,5 @@ pub fn explore_round(
         done(&trial);
         trial
     };
-    indices.into_par_iter().map(run).collect()
+    indices.par_iter().map(run).collect()
 }

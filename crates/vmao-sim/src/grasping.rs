@@ -12,6 +12,7 @@ use vmao_core::inverse_kinematics::{IkSettings, posture_cost, solutions, track};
 use vmao_core::observation::{Observation, PointLabel};
 use vmao_core::outcome::FailureStage;
 use vmao_core::random::Stream;
+use vmao_core::robots::RobotModel;
 
 /// How grasps are chosen and made.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -106,14 +107,13 @@ pub(crate) fn reachable_grasps(
     let index = usize::from(arm.0);
     let robot = &simulation.scene.robots[index];
     let width = (fingers[0] - fingers[1]).norm();
-    if width > robot.gripper.max_opening() - 0.004 {
+    let Some(opening) = opening_for(robot, config, width) else {
         let limit = robot.gripper.max_opening();
         return Err(Failure::new(
             FailureStage::Unreachable,
             format!("contacts {width:.3} m apart; the gripper opens {limit:.3} m"),
         ));
-    }
-    let opening = (width + config.opening_margin).min(robot.gripper.max_opening());
+    };
     let squared = squared(fingers, cloud, config.squaring_deg.to_radians());
     let poses = gripper_poses(squared.as_ref().unwrap_or(fingers), config.approaches);
     if poses.is_empty() {
@@ -122,16 +122,8 @@ pub(crate) fn reachable_grasps(
     let mut above_table = 0;
     let mut found = Vec::new();
     for (index, pose) in poses.into_iter().enumerate() {
-        let lowest = robot.lowest_gripper_point(&pose.world_from_tool, opening);
-        let missing = config.table_clearance - lowest;
-        let rise = -(pose.world_from_tool.rotation * Vector3::z()).z;
-        // Raised back along the approach until the fingertips clear the table.
-        let retreat = if missing <= 0.0 { 0.0 } else { missing / rise.max(1e-3) };
-        if retreat > config.max_retreat {
-            continue;
-        }
+        let Some(world_from_tool) = clear_of_table(robot, config, &pose, opening) else { continue };
         above_table += 1;
-        let world_from_tool = pose.backed_off(retreat);
         let ways =
             carried_grasps(simulation, config, (arm, part), &GripperPose { world_from_tool, ..pose }, opening, motion, stream);
         found.extend(ways.into_iter().map(|grasp| Grasp { pose: index, ..grasp }));
@@ -142,6 +134,21 @@ pub(crate) fn reachable_grasps(
     }
     found.sort_by(|a, b| a.cost.total_cmp(&b.cost));
     Ok(found)
+}
+
+/// The gap to open the pads to (m) for contacts `width` (m) apart; none if the gripper does not open so far.
+pub(crate) fn opening_for(robot: &RobotModel, config: &GraspConfig, width: f64) -> Option<f64> {
+    let most = robot.gripper.max_opening();
+    (width <= most - 0.004).then(|| (width + config.opening_margin).min(most))
+}
+
+/// The gripper pose raised back along its approach until the fingertips clear the table; none if that takes too much.
+pub(crate) fn clear_of_table(robot: &RobotModel, config: &GraspConfig, pose: &GripperPose, opening: f64) -> Option<Pose> {
+    let lowest = robot.lowest_gripper_point(&pose.world_from_tool, opening);
+    let missing = config.table_clearance - lowest;
+    let rise = -(pose.world_from_tool.rotation * Vector3::z()).z;
+    let retreat = if missing <= 0.0 { 0.0 } else { missing / rise.max(1e-3) };
+    (retreat <= config.max_retreat).then(|| pose.backed_off(retreat))
 }
 
 /// Points that lie neither on an arm, which knows where it is, nor on the table's plane.

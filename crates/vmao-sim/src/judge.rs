@@ -2,7 +2,7 @@
 //! but the description of the robots.
 
 use crate::{
-    convention::Data,
+    convention::{Data, compile},
     error::Error,
     mjcf,
     scene::{SceneConfig, addresses},
@@ -39,7 +39,7 @@ impl CollisionJudge {
         obstacles: &[Obstacle],
     ) -> Result<Self, Error> {
         let mjcf = mjcf::arms_among(config, robots, world_from_bases, obstacles);
-        let model = Arc::new(MjModel::from_xml_string(&mjcf).map_err(|cause| Error::Model { cause: cause.to_string() })?);
+        let model = Arc::new(compile(&mjcf).map_err(|cause| Error::Model { cause })?);
         let mut data = Data::new(model.clone());
         let mut joints = Vec::new();
         for (arm, (robot, &opening)) in robots.iter().zip(openings).enumerate() {

@@ -2,11 +2,10 @@
 //!
 //! MuJoCo's viewer shows the geom groups 0 to 2. Meshes are in group 2, the solids that they stand for in group 3.
 
-use crate::convention::pose_attributes;
+use crate::convention::{compile, pose_attributes};
 use crate::error::Error;
 use crate::mjcf;
 use crate::scene::{Scene, SceneConfig};
-use mujoco_rs::wrappers::mj_model::MjModel;
 use std::collections::BTreeSet;
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
@@ -44,7 +43,7 @@ impl Scene {
             return Err(Error::Meshes { cause: format!("{} is not UTF-8 text", mesh.file.display()) });
         }
         let mjcf = mjcf::scene(config, &self.robots, &self.world_from_bases, &self.object, meshes);
-        MjModel::from_xml_string(&mjcf).map_err(|cause| Error::Meshes { cause: cause.to_string() })?;
+        compile(&mjcf).map_err(|cause| Error::Meshes { cause })?;
         Ok(mjcf)
     }
 }

@@ -97,11 +97,12 @@ fn line(xml: &mut String, text: &str) {
 fn header(xml: &mut String, config: &SceneConfig) {
     line(xml, r#"<mujoco model="vmao">"#);
     line(xml, r#"<compiler angle="radian" autolimits="true"/>"#);
+    let SceneConfig { timestep, friction_impedance_ratio, noslip_iterations, noslip_tolerance, sleep_tolerance, .. } = config;
+    let sleep = if *sleep_tolerance > 0.0 { "enable" } else { "disable" };
     line(
         xml,
         &format!(
-            r#"<option timestep="{}" integrator="implicitfast" cone="elliptic" impratio="{}" noslip_iterations="{}" solver="Newton" iterations="100" tolerance="1e-8"/>"#,
-            config.timestep, config.friction_impedance_ratio, config.noslip_iterations
+            r#"<option timestep="{timestep}" integrator="implicitfast" cone="elliptic" impratio="{friction_impedance_ratio}" noslip_iterations="{noslip_iterations}" noslip_tolerance="{noslip_tolerance}" solver="Newton" iterations="100" tolerance="1e-8" sleep_tolerance="{sleep_tolerance}"><flag sleep="{sleep}"/></option>"#
         ),
     );
     // Stiff contacts (time constant twice the time step, MuJoCo's floor) keep a held part from creeping.

@@ -1,19 +1,20 @@
 //! A scene: arms around a table, one object, the compiled simulator model and who owns which of its geoms.
 
-use crate::convention::Data;
-use crate::convention::ball_joint_position;
+use crate::convention::{Data, ball_joint_position, compile};
 use crate::dependency_root::Root;
 use crate::error::Error;
 use crate::layout::{BasePlacement, Layout, Spacing, base_poses};
 use crate::mjcf;
+use crate::reachability;
 
 use mujoco_rs::wrappers::mj_model::{MjModel, MjtObjBase};
 use nalgebra::{Point3, Vector3};
 use serde::{Deserialize, Serialize};
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 use vmao_core::catalogue::CatalogueItem;
 use vmao_core::contact::{ArmId, ContactTuple, PartId};
 use vmao_core::geometry::{Pose, rotation_exp};
+use vmao_core::inverse_kinematics::InverseKinematics;
 use vmao_core::object::{ArticulatedObject, Joint, JointKind};
 use vmao_core::object_graph::ObjectGraph;
 use vmao_core::osc::{JOINTS, JointLimits, JointVector};
@@ -55,6 +56,10 @@ pub struct SceneConfig {
     pub friction_impedance_ratio: f64,
     /// MuJoCo's `noslip_iterations`.
     pub noslip_iterations: u32,
+    /// MuJoCo's `noslip_tolerance`: noslip ends when an iteration improves by less.
+    pub noslip_tolerance: f64,
+    /// MuJoCo's `sleep_tolerance` (m/s): an object at rest is not simulated until something touches it; 0 for never.
+    pub sleep_tolerance: f64,
     /// Friction of the gripper pads.
     pub pad_friction: Friction,
     /// Friction of the object.
@@ -115,11 +120,15 @@ pub struct Scene {
     pub(crate) model: Arc<MjModel>,
     pub(crate) arms: Vec<ArmIndex>,
     pub(crate) part_bodies: Vec<usize>,
+    /// Centre of mass of each part, part frame (m).
+    pub(crate) mass_centers: Vec<Point3<f64>>,
     pub(crate) object_qpos: usize,
     pub(crate) object_dof: usize,
     /// (qpos address, dof address) of each object joint; none for fixed joints.
     pub(crate) joint_addresses: Vec<Option<(usize, usize)>>,
     pub(crate) owners: Vec<Owner>,
+    /// Made when it is first asked for: most uses of a scene never do.
+    inverse_kinematics: OnceLock<Vec<Arc<InverseKinematics>>>,
 }
 
 impl Scene {
@@ -176,13 +185,14 @@ impl Scene {
         let CatalogueItem { object, demonstrations } = item;
         let graph = ObjectGraph::of(&object).map_err(|cause| Error::Object { name: object.name.clone(), cause })?;
         let mjcf = mjcf::scene(config, &robots, &world_from_bases, &object, &[]);
-        let model = MjModel::from_xml_string(&mjcf).map_err(|cause| Error::Model { cause: cause.to_string() })?;
+        let model = compile(&mjcf).map_err(|cause| Error::Model { cause })?;
         let arms = robots.iter().enumerate().map(|(arm, robot)| arm_index(&model, arm, robot)).collect::<Result<Vec<_>, _>>()?;
         let part_bodies = object
             .parts
             .iter()
             .map(|part| id(&model, MjtObjBase::mjOBJ_BODY, &mjcf::part_name(&part.name)))
             .collect::<Result<Vec<_>, _>>()?;
+        let mass_centers = part_bodies.iter().map(|&body| model.body_ipos()[body].into()).collect();
         let (object_qpos, object_dof) = addresses(&model, "object")?;
         let joint_addresses = object
             .joints
@@ -207,10 +217,12 @@ impl Scene {
             model: Arc::new(model),
             arms,
             part_bodies,
+            mass_centers,
             object_qpos,
             object_dof,
             joint_addresses,
             owners,
+            inverse_kinematics: OnceLock::new(),
         })
     }
 }
@@ -220,6 +232,11 @@ impl Scene {
     pub fn with_root(mut self, name: &str) -> Result<Self, Error> {
         self.root = Root::named(&self.object, name)?;
         Ok(self)
+    }
+
+    /// Inverse kinematics of every arm, for many poses.
+    pub(crate) fn inverse_kinematics(&self) -> &[Arc<InverseKinematics>] {
+        self.inverse_kinematics.get_or_init(|| reachability::prepared(&self.robots))
     }
 
     /// Writes the object's joint positions (rad or m, flat) into the simulator's coordinates.

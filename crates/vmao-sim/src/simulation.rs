@@ -1,9 +1,11 @@
 //! A running scene: state in, torques out, one tick at a time.
 
-use crate::convention::{Data, body_pose, free_joint_position, hinge_jacobian, joint_vector, mass_block};
+use crate::convention::{Data, body_pose, free_joint_position, hinge_jacobian, joint_vector, mass_block, warning};
+use crate::failure::Failure;
 use crate::profile::{Stage, time};
 use crate::recorder::Recorder;
 use crate::scene::{Owner, Scene};
+use crate::targets::Targets;
 use nalgebra::Vector6;
 use vmao_core::contact::{ArmId, PartId};
 use vmao_core::geometry::Pose;
@@ -11,6 +13,7 @@ use vmao_core::kinematics::SerialChain;
 use vmao_core::object::{JointKind, ObjectState};
 use vmao_core::object_centric::joint_positions;
 use vmao_core::osc::{ArmState, GripperGoal, JointVector, OscGains, torques};
+use vmao_core::outcome::FailureStage;
 
 /// What a gripper's drive is told.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -31,7 +34,7 @@ pub(crate) struct Touch {
 }
 
 /// Stiffness of the gripper's opening servo (N/m).
-const OPENING_STIFFNESS: f64 = 4000.0;
+pub(crate) const OPENING_STIFFNESS: f64 = 4000.0;
 
 /// One scene in motion.
 pub(crate) struct Simulation<'s> {
@@ -44,7 +47,11 @@ pub(crate) struct Simulation<'s> {
     pub(crate) grips: Vec<Grip>,
     /// Ticks so far.
     pub(crate) steps: u64,
+    /// Ticks at most.
+    pub(crate) max_steps: u64,
     pub(crate) recorder: Option<Recorder>,
+    /// Everything that was asked for, if it is kept.
+    pub(crate) targets: Option<Targets>,
     gains: OscGains,
     full_mass: Vec<f64>,
 }
@@ -72,11 +79,41 @@ impl<'s> Simulation<'s> {
             })
             .collect();
         let grips = scene.robots.iter().map(|robot| Grip::Open(robot.gripper.max_opening())).collect();
-        Self { scene, data, chains, goals, grips, steps: 0, recorder: None, gains, full_mass: vec![0.0; nv * nv] }
+        Self {
+            scene,
+            data,
+            chains,
+            goals,
+            grips,
+            steps: 0,
+            max_steps: u64::MAX,
+            recorder: None,
+            targets: None,
+            gains,
+            full_mass: vec![0.0; nv * nv],
+        }
+    }
+
+    /// One tick of a trial; fails when its steps are spent, or when the simulator has gone astray.
+    pub(crate) fn advance(&mut self) -> Result<(), Failure> {
+        if self.steps >= self.max_steps {
+            let why = format!("not done after {} steps, the most that a trial may take", self.steps);
+            return Err(Failure::new(FailureStage::Timeout, why));
+        }
+        self.tick();
+        match warning(&self.data) {
+            None => Ok(()),
+            // The simulator has put its state back or left something out: what follows would mean nothing.
+            Some(what) => Err(Failure::new(FailureStage::Timeout, format!("the simulation went astray: {what}"))),
+        }
     }
 
     /// One control tick and one physics step: torques from the state at its start.
     pub(crate) fn tick(&mut self) {
+        if let Some(mut targets) = self.targets.take() {
+            targets.note(self);
+            self.targets = Some(targets);
+        }
         time(Stage::Physics, || self.data.step1());
         time(Stage::Control, || self.command());
         time(Stage::Physics, || self.data.step2());

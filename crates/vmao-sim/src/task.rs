@@ -1,5 +1,8 @@
 //! The task: where the object lies at the start and where it shall go.
 
+use crate::grasping::GraspConfig;
+use crate::profile::{Stage, time};
+use crate::reachability::reachability;
 use crate::scene::Scene;
 use nalgebra::{Unit, UnitQuaternion, Vector3};
 use serde::{Deserialize, Serialize};
@@ -7,6 +10,7 @@ use vmao_core::contact::PartId;
 use vmao_core::geometry::{Pose, rotation_distance};
 use vmao_core::object::{Joint, JointKind, ObjectGoal, ObjectState};
 use vmao_core::object_centric::{ball_change, joint_errors, joint_positions, part_poses};
+use vmao_core::outcome::Reachability;
 use vmao_core::random::Stream;
 
 /// Where objects start: on the table, at any heading.
@@ -33,6 +37,8 @@ pub struct GoalConfig {
     pub joint_change_share: f64,
     /// ... and a joint that turns by at least this much (degrees).
     pub joint_change_deg: f64,
+    /// Whether a goal that is not known to be within reach is drawn anew.
+    pub reject_unreachable: bool,
 }
 
 /// When a goal counts as met.
@@ -81,6 +87,38 @@ pub(crate) fn lowest_point(scene: &Scene, world_from_root: &Pose, joints: &[f64]
     let placed = scene.object.parts.iter().zip(&parts);
     let heights = placed.flat_map(|(part, pose)| part.solids.iter().map(move |solid| solid.lowest_point(pose)));
     heights.fold(f64::INFINITY, f64::min)
+}
+
+/// What is known of a trial's goal before anything moves.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct GoalReach {
+    /// Whether the arms reach it.
+    pub reachability: Reachability,
+    /// How many goals were drawn before it and rejected.
+    pub redraws: u32,
+}
+
+/// Goals drawn anew at most; the last one stays, whatever its reachability.
+const MOST_REDRAWS: u32 = 100;
+
+/// The goal of a trial that starts at `start`, the parts' poses there, and what is known of it.
+pub(crate) fn draw_goal(
+    scene: &Scene,
+    (goal, grasp): (&GoalConfig, &GraspConfig),
+    start: &ObjectState,
+    stream: &mut Stream,
+) -> (ObjectGoal, Vec<Pose>, GoalReach) {
+    let mut redraws = 0;
+    loop {
+        let drawn = sample_goal(scene, goal, start, stream);
+        let parts = part_poses(&scene.object, &scene.graph, drawn.root, &drawn.world_from_root, &drawn.joint_positions);
+        let reachability = time(Stage::Grasping, || reachability(scene, grasp, &start.world_from_parts, &parts));
+        if !goal.reject_unreachable || reachability == Reachability::Reachable || redraws == MOST_REDRAWS {
+            return (drawn, parts, GoalReach { reachability, redraws });
+        }
+        redraws += 1;
+    }
 }
 
 /// A goal for an object that lies at `start`: lifted, moved, turned, tilted, every joint changed; never met at the start.

@@ -8,7 +8,8 @@ use crate::grasping::GraspConfig;
 use crate::measures::MotionMeasures;
 use crate::profile::{self, Stage};
 use crate::scene::Scene;
-use crate::task::{GoalConfig, StartConfig, Thresholds};
+use crate::targets::Targets;
+use crate::task::{GoalConfig, GoalReach, StartConfig, Thresholds};
 use serde::{Deserialize, Serialize};
 use vmao_core::contact_model::ContactModel;
 use vmao_core::order::GraspOrder;
@@ -43,10 +44,12 @@ pub enum Recording {
     Off,
     /// The motion too.
     On,
+    /// What the controllers were asked for too.
+    Targets,
 }
 
 /// What a trial leaves behind.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone)]
 pub struct Trial {
     /// What is stored.
     pub record: TrialRecord,
@@ -54,8 +57,12 @@ pub struct Trial {
     pub threshold_factor: f64,
     /// How the motions of the object went with all parts held; zeros if it never came to that.
     pub motion: MotionMeasures,
+    /// What was known of its goal before anything moved.
+    pub reach: GoalReach,
     /// Its motion, if asked for.
     pub rollout: Option<Rollout>,
+    /// What the controllers were asked for, if it was to be kept.
+    pub targets: Option<Targets>,
 }
 
 /// Runs trial `index` of the run with `seed`: look, choose contacts, grasp, plan, move, until all parts are at the goal.
@@ -77,10 +84,10 @@ pub fn run_trial(
 }
 
 fn manipulate(attempt: &mut Attempt<'_>, model: &dyn ContactModel, order: GraspOrder) -> Result<(), Failure> {
+    attempt.settled()?;
     for step in order.steps(attempt.part_count()) {
-        let contacts = attempt.propose_contacts(model, step)?;
-        let choices = attempt.choose_grasps(&contacts)?;
-        let (grasps, approach) = attempt.plan_approach(choices)?;
+        let proposals = attempt.propose_contacts(model, step)?;
+        let (grasps, approach) = attempt.first_feasible(&proposals)?;
         attempt.approach(&grasps, &approach)?;
         attempt.take_hold(&grasps)?;
         attempt.move_object()?;

@@ -5,9 +5,10 @@ mod support;
 use nalgebra::Point3;
 use support::{SEED, WorldPoints, configuration, failed_at, scene};
 use vmao_core::contact::{Contact, PartId};
-use vmao_core::contact_model::{ContactModel, FixedTuple};
+use vmao_core::contact_model::{ContactModel, ContactQuery, FingerPoints, FixedTuple};
 use vmao_core::order::GraspOrder;
 use vmao_core::outcome::FailureStage;
+use vmao_core::random::Stream;
 use vmao_sim::{Recording, Trial, run_trial};
 
 /// Runs a trial with this model in both orders and checks where it fails; returns the last.
@@ -98,4 +99,29 @@ fn fingers_beside_the_part_close_on_nothing() {
     let trial = run_trial(&scene, &config, &model, GraspOrder::Sequential, (SEED, 0), Recording::Off);
     let stage = failed_at(&trial);
     assert_eq!(stage, FailureStage::NoContact, "{}", trial.record.detail);
+}
+
+/// Two proposals out of reach, then the demonstrated one, then another out of reach.
+struct Ranked(FixedTuple);
+
+impl ContactModel for Ranked {
+    fn propose(&self, query: &ContactQuery<'_>, stream: &mut Stream) -> Vec<FingerPoints> {
+        let far = |height: f64| [Point3::new(0.0, -0.01, height), Point3::new(0.0, 0.01, height)];
+        let good = self.0.propose(query, stream);
+        [vec![far(9.0), far(8.0)], good, vec![far(7.0)]].concat()
+    }
+}
+
+#[test]
+fn the_first_proposal_that_can_be_made_is_taken_and_recorded() {
+    let scene = scene(0);
+    let (_, config) = configuration();
+    let demonstrated = FixedTuple(scene.demonstrations[0].clone());
+    for order in [GraspOrder::Parallel, GraspOrder::Sequential] {
+        let run = |model: &dyn ContactModel| run_trial(&scene, &config, model, order, (SEED, 0), Recording::On);
+        let (alone, ranked) = (run(&demonstrated), run(&Ranked(demonstrated.clone())));
+        assert!(alone.record.outcome.is_success(), "{order:?}: {}", alone.record.detail);
+        assert_eq!(ranked.record, alone.record, "{order:?}: as if only this had been proposed");
+        assert_eq!(ranked.rollout, alone.rollout, "{order:?}");
+    }
 }

@@ -4,12 +4,18 @@
 
 use crate::{
     config_layers::{self, Layer},
+    inputs::{Inputs, is_path},
     provenance::sha256_hex,
     results::Method,
 };
 use serde::{Deserialize, Serialize};
 use std::path::Path;
-use vmao_core::{catalogue::InstanceSet, order::GraspOrder, osc::OscGains, robots::SLOTS};
+use vmao_core::{
+    catalogue::{CatalogueItem, InstanceSet},
+    order::GraspOrder,
+    osc::OscGains,
+    robots::SLOTS,
+};
 use vmao_net::{NetworkConfig, TrainingConfig};
 use vmao_sim::{
     CameraConfig, GoalConfig, GraspConfig, MAX_ARMS, MotionConfig, SceneConfig, StartConfig, Thresholds, TrialConfig,
@@ -62,16 +68,34 @@ pub struct Config {
     pub train: TrainingConfig,
     /// The cells of the table.
     pub evaluate: EvaluateConfig,
+    /// The files that it names.
+    #[serde(skip)]
+    pub inputs: Inputs,
 }
 
 /// What is manipulated.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ObjectConfig {
-    /// A name of the catalogue.
+    /// A name of the catalogue, or the path of an object file or of its folder (with a `/`).
     pub name: String,
+    /// Further object files that are explored: other sizes of the same object.
+    pub sizes: Vec<String>,
+    /// Object files that are kept back for evaluation; none for those explored.
+    pub held_out: Vec<String>,
     /// The dependency root: `first`, a part's name, or `auto`.
     pub root: String,
+}
+
+/// Where Algorithm 1 starts from.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Demonstrations {
+    /// The object's own; of objects without any, found from their shape.
+    Own,
+    /// Found from the object's shape.
+    Found,
+    /// From a file.
+    File(String),
 }
 
 /// Who manipulates.
@@ -106,6 +130,22 @@ pub struct ExploreConfig {
     pub max_trials: u64,
     /// Grasp orders, taken in turn by the trials; empty stands for `trial.order`.
     pub orders: Vec<GraspOrder>,
+    /// `own`, `found`, or the path of a file (with a `/` or an ending).
+    pub demonstrations: String,
+    /// Tuples whose contacts are all closer than this are near-duplicates (m).
+    pub near_distance: f64,
+    /// What the label set does with accepted near-duplicates.
+    pub near_duplicates: NearDuplicates,
+}
+
+/// What the label set does with an accepted tuple that is near one accepted before; the data set has it either way.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum NearDuplicates {
+    /// It joins the label set, as in Algorithm 1.
+    Keep,
+    /// It is left out, so that the label set does not crowd.
+    LeaveOut,
 }
 
 /// The cells of the table.
@@ -120,6 +160,8 @@ pub struct EvaluateConfig {
     pub instances: InstanceSet,
     /// The methods compared.
     pub methods: Vec<Method>,
+    /// K, latent codes that best-of-K draws for each grasp.
+    pub best_of: usize,
 }
 
 impl Config {
@@ -135,9 +177,11 @@ impl Config {
         let refuse = |message: String| ConfigError { origin: "configuration".to_owned(), message };
         let shipped: toml::Table = SHIPPED.parse().map_err(|error: toml::de::Error| refuse(error.to_string()))?;
         let merged = config_layers::merge(shipped, &layers)?;
-        let config: Self = serde_path_to_error::deserialize(merged)
+        let mut config: Self = serde_path_to_error::deserialize(merged)
             .map_err(|error| refuse(format!("{}: {}", error.path(), error.inner().message().trim())))?;
         config.check().map_err(refuse)?;
+        Inputs::resolve(&mut config)?;
+        config.check_sizes().map_err(refuse)?;
         Ok(config)
     }
 
@@ -165,9 +209,41 @@ impl Config {
         }
     }
 
+    /// Where Algorithm 1 starts from.
+    pub fn demonstrations(&self) -> Demonstrations {
+        match self.explore.demonstrations.as_str() {
+            "own" => Demonstrations::Own,
+            "found" => Demonstrations::Found,
+            path => Demonstrations::File(path.to_owned()),
+        }
+    }
+
+    /// The object's own name, also where it is from a file.
+    pub fn object_name(&self) -> &str {
+        self.inputs.object(&self.object.name).map_or(&self.object.name, |item| &item.object.name)
+    }
+
     /// The orders that exploration takes in turn.
     pub fn explored_orders(&self) -> Vec<GraspOrder> {
         if self.explore.orders.is_empty() { vec![self.trial.order] } else { self.explore.orders.clone() }
+    }
+
+    /// Refuses sizes of an object that do not have the same parts and joints.
+    fn check_sizes(&self) -> Result<(), String> {
+        let ObjectConfig { name, sizes, held_out } = &self.object;
+        let others = || sizes.iter().chain(held_out);
+        let Some(first) = self.inputs.object(name) else {
+            let none = others().next().is_none();
+            return ensure(none, "object", "sizes or held_out for an object of the catalogue, which has its own", "none");
+        };
+        let parts = |item: &CatalogueItem| -> Vec<String> { item.object.parts.iter().map(|part| part.name.clone()).collect() };
+        for other in others() {
+            let item = self.inputs.object(other).ok_or_else(|| format!("object: {other} is no path, expected object files"))?;
+            let (found, expected) = (parts(item).join(", "), parts(first).join(", "));
+            let same = found == expected && item.object.joints.len() == first.object.joints.len();
+            ensure(same, other, &format!("parts {found}"), &format!("those of {name}: {expected}"))?;
+        }
+        Ok(())
     }
 
     fn check(&self) -> Result<(), String> {
@@ -187,6 +263,8 @@ impl Config {
         within("scene.base_distance", scene.base_distance, 0.2, 2.0)?;
         within("scene.base_spacing", scene.base_spacing, 0.2, 2.0)?;
         within("scene.timestep", scene.timestep, 1e-4, 5e-3)?;
+        within("scene.noslip_tolerance", scene.noslip_tolerance, 0.0, 1.0)?;
+        within("scene.sleep_tolerance", scene.sleep_tolerance, 0.0, 0.1)?;
         within("scene.friction_impedance_ratio", scene.friction_impedance_ratio, 1.0, 1000.0)?;
         for (key, friction) in [
             ("scene.pad_friction", scene.pad_friction),
@@ -217,9 +295,14 @@ impl Config {
         at_least_one("explore.round_size", explore.round_size)?;
         at_least_one("explore.successes", explore.successes)?;
         at_least_one("explore.max_trials", explore.max_trials)?;
+        within("explore.near_distance", explore.near_distance, 0.0, 1.0)?;
+        let known = self.demonstrations();
+        let usable = !matches!(&known, Demonstrations::File(name) if !is_path(name));
+        ensure(usable, "explore.demonstrations", &explore.demonstrations, "own, found, or a path")?;
         at_least_one("evaluate.trials", evaluate.trials)?;
         ensure(!evaluate.orders.is_empty(), "evaluate.orders", "no orders", "at least one")?;
         ensure(!evaluate.methods.is_empty(), "evaluate.methods", "no methods", "at least one")?;
+        ensure((1..=1000).contains(&evaluate.best_of), "evaluate.best_of", &evaluate.best_of.to_string(), "1 to 1000")?;
         self.network.validate().map_err(|error| format!("network: {error}"))?;
         self.train.validate().map_err(|error| format!("train: {error}"))
     }
@@ -278,6 +361,7 @@ fn check_control(grasp: &GraspConfig, motion: &MotionConfig, osc: &OscGains) -> 
     within("motion.shortest_motion", motion.shortest_motion, 0.1, 60.0)?;
     positive("motion.collision_force", motion.collision_force)?;
     within("motion.waypoints", motion.waypoints as f64, 1.0, 1000.0)?;
+    at_least_one("motion.max_steps", motion.max_steps)?;
     positive("osc.position_stiffness", osc.position_stiffness)?;
     positive("osc.rotation_stiffness", osc.rotation_stiffness)?;
     positive("osc.damping_ratio", osc.damping_ratio)?;

@@ -2,6 +2,7 @@
 
 use crate::{
     config::ConfigError,
+    inputs::rebase,
     wording::{Place, quoted, unknown},
 };
 use std::path::Path;
@@ -38,12 +39,13 @@ pub(crate) fn merge(mut base: Table, layers: &[Layer]) -> Result<Table, ConfigEr
     for layer in layers {
         match layer {
             Layer::File(name, text) => {
-                let over: Table = text.parse().map_err(|error: toml::de::Error| ConfigError {
+                let mut over: Table = text.parse().map_err(|error: toml::de::Error| ConfigError {
                     origin: error
                         .span()
                         .map_or(name.clone(), |span| format!("{name}: {}", Place::of(text.as_bytes(), span.start))),
                     message: error.message().trim().to_owned(),
                 })?;
+                rebase(&mut over, Path::new(name).parent().unwrap_or(Path::new("")));
                 overlay(&mut base, over, &mut Vec::new()).map_err(|Mismatch { path, message }| ConfigError {
                     origin: place(text, &path).map_or(name.clone(), |place| format!("{name}: {place}")),
                     message,

@@ -15,7 +15,7 @@ use std::path::Path;
 use vmao_core::order::GraspOrder;
 use vmao_core::outcome::TrialOutcome;
 use vmao_core::random::Stream;
-use vmao_sim::{Recording, Scene, Trial, run_trial, scene_of_trial};
+use vmao_sim::{GoalReach, Recording, Scene, Trial, run_trial, scene_of_trial};
 
 /// Names the stream that the seed of evaluation trials is drawn from, so that none of them was explored.
 const EVALUATION: u64 = 1 << 34;
@@ -40,6 +40,12 @@ pub struct TrialLine {
     pub final_errors: [f64; 4],
     /// The factor on all thresholds at which it would have succeeded; none if it did not get so far.
     pub threshold_factor: Option<f64>,
+    /// What was known of its goal before anything moved; not in files of older versions.
+    #[serde(default)]
+    pub goal: GoalReach,
+    /// The dependency root; not in files of older versions.
+    #[serde(default)]
+    pub root: u16,
 }
 
 /// Everything that trials of the table run on.
@@ -94,12 +100,13 @@ impl<'a> Evaluation<'a> {
 
     /// The cells that these trials make.
     pub fn results(&self, info: &RunInfo, lines: &[TrialLine]) -> Results {
-        let (object, robots) = (&self.config.object.name, &self.config.robots.names);
+        let (object, robots) = (self.config.object_name(), &self.config.robots.names);
         let mut cells = Vec::new();
         for &order in &self.config.evaluate.orders {
             for (method, _) in &self.methods {
-                let of_cell = lines.iter().filter(|line| line.order == order && line.method == *method);
-                cells.push(Cell::new(object, robots, order, *method, of_cell.map(|line| line.outcome)));
+                let of_cell = || lines.iter().filter(|line| line.order == order && line.method == *method);
+                let cell = Cell::new(object, robots, order, *method, of_cell().map(|line| line.outcome));
+                cells.push(cell.with_goals(of_cell().map(|line| line.goal)));
             }
         }
         Results::new(info, cells)
@@ -119,6 +126,8 @@ impl TrialLine {
             steps: record.steps,
             final_errors: record.final_errors,
             threshold_factor: trial.threshold_factor.is_finite().then_some(trial.threshold_factor),
+            goal: trial.reach,
+            root: record.goal.root.0,
         }
     }
 }

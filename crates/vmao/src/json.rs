@@ -158,6 +158,11 @@ impl Document {
         Ok(Self { file, text })
     }
 
+    /// What was read.
+    pub fn text(&self) -> &str {
+        &self.text
+    }
+
     /// The document as `T`, an object; unknown fields, wrong types and text after the end are refused with their place.
     pub fn parse<T: DeserializeOwned>(&self) -> Result<T, DocumentError> {
         let mut deserializer = serde_json::Deserializer::from_str(&self.text);

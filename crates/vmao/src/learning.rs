@@ -2,7 +2,7 @@
 
 use crate::config::Config;
 use crate::failure::{Failure, OrBadInput};
-use crate::learned_contacts::LearnedContacts;
+use crate::learned_contacts::{LearnedContacts, methods};
 use crate::output::{progress_bar, write_whole};
 use crate::results::Method;
 use crate::scenes::grasps;
@@ -39,14 +39,6 @@ pub struct EpochLine {
     pub learning_rate: f32,
 }
 
-/// What the network of this method is.
-pub fn model_kind(method: Method) -> ModelKind {
-    match method {
-        Method::Vmao => ModelKind::Vmao,
-        Method::Top1 => ModelKind::Top1,
-    }
-}
-
 /// The training examples of `part`: what was seen before the successful grasps of it, and where they touched.
 pub fn examples(records: &[TrialRecord], part: usize) -> Vec<Example> {
     let successes = records.iter().filter(|record| record.outcome.is_success());
@@ -60,17 +52,17 @@ pub fn examples(records: &[TrialRecord], part: usize) -> Vec<Example> {
         .collect()
 }
 
-/// Trains the networks of all grasp steps of `method` into `directory`: `grasp-0/`, `grasp-1/`, … and `training.jsonl`.
+/// Trains the networks of all grasp steps of `kind` into `directory`: `grasp-0/`, `grasp-1/`, … and `training.jsonl`.
 pub fn train_all(
     config: &Config,
-    method: Method,
+    kind: ModelKind,
     records: &[TrialRecord],
     seed: u64,
     directory: &Path,
 ) -> Result<Vec<EpochLine>, Failure> {
     let grasps = grasps(config)?;
     let mut lines = Vec::new();
-    let bar = progress_bar(&format!("train {}", method.title()), (grasps * config.train.epochs) as u64);
+    let bar = progress_bar(&format!("train {}", kind.title()), (grasps * config.train.epochs) as u64);
     for grasp in 0..grasps {
         let examples = examples(records, grasp);
         let mut on_epoch = |report: &EpochReport| {
@@ -82,8 +74,8 @@ pub fn train_all(
             ControlFlow::Continue(())
         };
         let seed = vmao_core::random::Stream::new(seed, &[TRAINING, grasp as u64]).bits();
-        let checkpoint = train(model_kind(method), &config.network, &config.train, &examples, u64::from(seed), &mut on_epoch)
-            .with_context(|| format!("grasp {} of {}, {} successful examples", grasp + 1, method.title(), examples.len()))?;
+        let checkpoint = train(kind, &config.network, &config.train, &examples, u64::from(seed), &mut on_epoch)
+            .with_context(|| format!("grasp {} of {}, {} successful examples", grasp + 1, kind.title(), examples.len()))?;
         save(&checkpoint, &grasp_directory(directory, grasp))?;
     }
     bar.finish();
@@ -123,8 +115,8 @@ fn save(checkpoint: &Checkpoint, directory: &Path) -> Result<(), Failure> {
     Ok(())
 }
 
-/// The method of a checkpoint directory and its networks, one for each of `grasps` steps; damaged files are refused.
-pub fn load(directory: &Path, grasps: usize) -> Result<(Method, LearnedContacts), Failure> {
+/// The kind of a checkpoint directory's networks, and the networks, one for each of `grasps` steps; damaged files are refused.
+pub fn load(directory: &Path, grasps: usize) -> Result<(ModelKind, Vec<ContactNetwork>), Failure> {
     let networks = (0..grasps).map(|grasp| load_one(&grasp_directory(directory, grasp))).collect::<Result<Vec<_>, _>>()?;
     let kind = networks.first().map_or(ModelKind::Top1, ContactNetwork::kind);
     if let Some(odd) = networks.iter().position(|network| network.kind() != kind) {
@@ -132,11 +124,18 @@ pub fn load(directory: &Path, grasps: usize) -> Result<(Method, LearnedContacts)
         let message = format!("{}: a {:?} network, expected {kind:?} as in grasp-0", place.display(), networks[odd].kind());
         return Err(Failure::bad_input(message));
     }
-    let method = match kind {
-        ModelKind::Vmao => Method::Vmao,
-        ModelKind::Top1 => Method::Top1,
-    };
-    Ok((method, LearnedContacts { networks }))
+    Ok((kind, networks))
+}
+
+/// The networks of every kind that a run directory's `models` holds, for the methods that are configured.
+pub fn load_methods(models: &Path, config: &Config) -> Result<Vec<(Method, LearnedContacts)>, Failure> {
+    let mut found = Vec::new();
+    for place in ModelKind::ALL.map(|kind| models.join(kind.name())) {
+        if place.is_dir() {
+            found.push(load(&place, grasps(config)?)?);
+        }
+    }
+    Ok(methods(&config.evaluate, &found))
 }
 
 fn load_one(directory: &Path) -> Result<ContactNetwork, Failure> {

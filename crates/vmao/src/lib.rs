@@ -2,27 +2,35 @@
 //!
 //! It knows files and people; the simulator's pointers and the network's tensors stay in their own crates.
 
+pub mod acceptance;
 pub mod commands;
 pub mod config;
 mod config_layers;
 mod contact_maps;
 pub mod dataset;
+pub mod demonstrations;
 pub mod evaluation;
 pub mod exploration;
 pub mod failure;
 pub mod ik;
+pub mod inputs;
+pub mod interruption;
 pub mod json;
 mod json_place;
 pub mod learned_contacts;
 pub mod learning;
+pub mod merging;
 pub mod object_import;
 pub mod ocao;
 pub mod output;
 pub mod plan;
 pub mod provenance;
+pub mod replay;
 pub mod report;
 pub mod results;
 pub mod robot_meshes;
 pub mod run_report;
 pub mod scenes;
+pub mod sharing;
+pub mod statistics;
 pub use vmao_core::wording;

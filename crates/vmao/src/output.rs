@@ -1,5 +1,6 @@
 //! What leaves the program: data to stdout, words and bars to stderr, files whole or not at all.
 
+use crate::interruption::writing;
 use indicatif::{ProgressBar, ProgressStyle};
 use serde::Serialize;
 use std::{
@@ -65,6 +66,7 @@ pub fn partial_path(path: &Path) -> PathBuf {
 pub fn write_whole(path: &Path, write: impl FnOnce(&mut BufWriter<File>) -> io::Result<()>) -> io::Result<()> {
     let directory = path.parent().filter(|parent| !parent.as_os_str().is_empty()).unwrap_or(Path::new("."));
     let partial = partial_path(path);
+    let _writing = writing();
     let mut writer = BufWriter::new(File::create(&partial)?);
     let written = write(&mut writer).and_then(|()| writer.flush()).and_then(|()| writer.get_ref().sync_all());
     if let Err(error) = written {

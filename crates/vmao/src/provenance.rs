@@ -65,7 +65,7 @@ impl RunInfo {
         Ok(())
     }
 
-    /// Writes `config.toml` and `run.json` into `directory`.
+    /// Writes `config.toml`, `run.json` and copies of the files that the configuration names into `directory`.
     pub fn save(&self, directory: &Path, config: &Config) -> io::Result<()> {
         self.save_as(&directory.join("config.toml"), &directory.join("run.json"), config)
     }
@@ -77,6 +77,7 @@ impl RunInfo {
 
     fn save_as(&self, config_file: &Path, run_file: &Path, config: &Config) -> io::Result<()> {
         let text = config.to_toml().map_err(io::Error::other)?;
+        config.inputs.save(config_file.parent().unwrap_or(Path::new("")))?;
         write_whole(config_file, |file| file.write_all(text.as_bytes()))?;
         let json = serde_json::to_string_pretty(self)?;
         write_whole(run_file, |file| writeln!(file, "{json}"))

@@ -5,8 +5,10 @@ use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use vmao_core::{
     order::GraspOrder,
-    outcome::{FailureStage, TrialOutcome},
+    outcome::{FailureStage, Reachability, TrialOutcome},
 };
+use vmao_net::ModelKind;
+use vmao_sim::GoalReach;
 
 /// Who chooses the contacts.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
@@ -14,6 +16,8 @@ use vmao_core::{
 pub enum Method {
     /// Contacts drawn from the generative model.
     Vmao,
+    /// Contacts drawn several times from the generative model, the most probable that can be made: an addition of ours.
+    BestOfK,
     /// The most probable contacts of the deterministic model.
     Top1,
 }
@@ -23,7 +27,16 @@ impl Method {
     pub fn name(self) -> &'static str {
         match self {
             Self::Vmao => "vmao",
+            Self::BestOfK => "best-of-k",
             Self::Top1 => "top1",
+        }
+    }
+
+    /// The network that it asks.
+    pub fn model(self) -> ModelKind {
+        match self {
+            Self::Vmao | Self::BestOfK => ModelKind::Vmao,
+            Self::Top1 => ModelKind::Top1,
         }
     }
 
@@ -31,6 +44,7 @@ impl Method {
     pub fn title(self) -> &'static str {
         match self {
             Self::Vmao => "V-MAO",
+            Self::BestOfK => "V-MAO best-of-K",
             Self::Top1 => "Top-1",
         }
     }
@@ -54,6 +68,49 @@ pub fn wilson95(successes: u64, trials: u64) -> [f64; 2] {
     [low, high]
 }
 
+/// What was known of the goals of a cell's trials; the same for all methods.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct GoalCounts {
+    /// Goals that the arms reach.
+    pub reachable: u64,
+    /// Goals proven to be out of their reach.
+    pub unreachable: u64,
+    /// Goals of which neither was found.
+    pub unknown: u64,
+    /// Goals that were drawn anew because the configuration asks for it.
+    pub redraws: u64,
+}
+
+impl GoalCounts {
+    /// Counts the goals of trials.
+    pub fn of(goals: impl IntoIterator<Item = GoalReach>) -> Self {
+        let mut counts = Self::default();
+        for goal in goals {
+            counts.redraws += u64::from(goal.redraws);
+            match goal.reachability {
+                Reachability::Reachable => counts.reachable += 1,
+                Reachability::Unreachable => counts.unreachable += 1,
+                Reachability::Unknown => counts.unknown += 1,
+            }
+        }
+        counts
+    }
+
+    /// "goals proven out of reach: 3 of 160"; what is zero otherwise is left out.
+    pub fn sentence(&self) -> String {
+        let total = self.reachable.saturating_add(self.unreachable).saturating_add(self.unknown);
+        let mut text = format!("goals proven out of reach: {} of {total}", self.unreachable);
+        if self.unknown > 0 {
+            text += &format!(", undecided: {}", self.unknown);
+        }
+        if self.redraws > 0 {
+            text += &format!(", drawn anew: {}", self.redraws);
+        }
+        text
+    }
+}
+
 /// One cell of the table: `successes + sum(failures) == trials`, always.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(try_from = "CellFields", into = "CellFields")]
@@ -64,6 +121,7 @@ pub struct Cell {
     method: Method,
     successes: u64,
     failures: BTreeMap<FailureStage, u64>,
+    goals: Option<GoalCounts>,
 }
 
 /// A cell as `results.json` writes it.
@@ -79,6 +137,9 @@ struct CellFields {
     rate: f64,
     wilson95: [f64; 2],
     failures: BTreeMap<FailureStage, u64>,
+    /// Not in files of older versions.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    goals: Option<GoalCounts>,
 }
 
 impl Cell {
@@ -98,7 +159,17 @@ impl Cell {
                 TrialOutcome::Failed(stage) => *failures.entry(stage).or_default() += 1,
             }
         }
-        Self { object: object.to_owned(), robots: robots.to_vec(), order, method, successes, failures }
+        Self { object: object.to_owned(), robots: robots.to_vec(), order, method, successes, failures, goals: None }
+    }
+
+    /// The same cell with what was known of its trials' goals.
+    pub fn with_goals(self, goals: impl IntoIterator<Item = GoalReach>) -> Self {
+        Self { goals: Some(GoalCounts::of(goals)), ..self }
+    }
+
+    /// What was known of its trials' goals, if that is known.
+    pub fn goals(&self) -> Option<GoalCounts> {
+        self.goals
     }
 
     /// The object's catalogue name.
@@ -150,8 +221,8 @@ impl Cell {
 impl From<Cell> for CellFields {
     fn from(cell: Cell) -> Self {
         let (trials, rate, wilson95) = (cell.trials(), cell.rate(), cell.wilson95());
-        let Cell { object, robots, order, method, successes, failures } = cell;
-        Self { object, robots, order, method, trials, successes, rate, wilson95, failures }
+        let Cell { object, robots, order, method, successes, failures, goals } = cell;
+        Self { object, robots, order, method, trials, successes, rate, wilson95, failures, goals }
     }
 }
 
@@ -159,13 +230,19 @@ impl TryFrom<CellFields> for Cell {
     type Error = String;
 
     fn try_from(fields: CellFields) -> Result<Self, String> {
-        let CellFields { object, robots, order, method, trials, successes, rate, wilson95: _, failures } = fields;
+        let CellFields { object, robots, order, method, trials, successes, rate, wilson95: _, failures, goals } = fields;
         let failed = failures.values().try_fold(0_u64, |sum, &count| sum.checked_add(count));
         let counted = failed.and_then(|failed| failed.checked_add(successes));
         if counted != Some(trials) {
             return Err(format!("{successes} successes and {failures:?} failures, expected {trials} trials in all"));
         }
-        let cell = Self { object, robots, order, method, successes, failures };
+        if let Some(counts) = goals {
+            let all = [counts.reachable, counts.unreachable, counts.unknown];
+            if all.iter().try_fold(0_u64, |sum, &count| sum.checked_add(count)) != Some(trials) {
+                return Err(format!("goals {all:?}, expected {trials} in all"));
+            }
+        }
+        let cell = Self { object, robots, order, method, successes, failures, goals };
         if (cell.rate() - rate).abs() > 1e-9 {
             return Err(format!("rate {rate}, expected {successes} / {trials} = {}", cell.rate()));
         }
@@ -198,6 +275,19 @@ impl Results {
         Self { schema: 1, version, commit, config_sha256: info.config_sha256.clone(), seed: info.seed, cells }
     }
 
+    /// What was known of the goals of all cells; none if that is not known of every cell.
+    pub fn goals(&self) -> Option<GoalCounts> {
+        self.cells.iter().map(Cell::goals).try_fold(GoalCounts::default(), |sum, counts| {
+            let counts = counts?;
+            Some(GoalCounts {
+                reachable: sum.reachable.saturating_add(counts.reachable),
+                unreachable: sum.unreachable.saturating_add(counts.unreachable),
+                unknown: sum.unknown.saturating_add(counts.unknown),
+                redraws: sum.redraws.saturating_add(counts.redraws),
+            })
+        })
+    }
+
     /// The table for people: a row for each cell, with its interval and where its failures began.
     pub fn table(&self) -> String {
         let mut rows: Vec<Vec<String>> = Vec::with_capacity(self.cells.len() + 1);
@@ -222,12 +312,13 @@ impl Results {
             }));
             rows.push(row);
         }
-        aligned(&rows, 4)
+        let goals = self.goals().map_or_else(String::new, |counts| counts.sentence() + "\n");
+        aligned(&rows, 4) + &goals
     }
 }
 
 /// Rows as text: the first `left` columns flush left, the others right; a rule under the first row.
-fn aligned(rows: &[Vec<String>], left: usize) -> String {
+pub(crate) fn aligned(rows: &[Vec<String>], left: usize) -> String {
     let columns = rows.first().map_or(0, Vec::len);
     let width = |column: usize| rows.iter().map(|row| row[column].chars().count()).max().unwrap_or(0);
     let widths: Vec<usize> = (0..columns).map(width).collect();
@@ -302,8 +393,33 @@ mod tests {
         assert_eq!(serde_json::from_value::<Cell>(json).unwrap(), cell());
     }
 
+    fn goals() -> Vec<GoalReach> {
+        let said = |reachability| GoalReach { reachability, redraws: 0 };
+        let mut goals = vec![said(Reachability::Reachable); 37];
+        goals.extend([said(Reachability::Unreachable), said(Reachability::Unreachable), said(Reachability::Unknown)]);
+        goals
+    }
+
+    #[test]
+    fn goals_are_counted_written_and_told() {
+        let cell = cell().with_goals(goals());
+        let counts = GoalCounts { reachable: 37, unreachable: 2, unknown: 1, redraws: 0 };
+        assert_eq!(cell.goals(), Some(counts));
+        assert_eq!(counts.sentence(), "goals proven out of reach: 2 of 40, undecided: 1");
+        assert_eq!(
+            GoalCounts { unknown: 0, redraws: 7, ..counts }.sentence(),
+            "goals proven out of reach: 2 of 39, drawn anew: 7"
+        );
+        let json = serde_json::to_value(&cell).unwrap();
+        assert_eq!(json["goals"]["unreachable"], 2);
+        assert_eq!(serde_json::from_value::<Cell>(json).unwrap(), cell);
+    }
+
     #[test]
     fn counts_that_do_not_add_up_are_refused() {
+        let mut json = serde_json::to_value(cell().with_goals(goals())).unwrap();
+        json["goals"]["unknown"] = u64::MAX.into();
+        assert!(serde_json::from_value::<Cell>(json).unwrap_err().to_string().contains("expected 40 in all"));
         for (field, value) in [("trials", 41.into()), ("successes", u64::MAX.into()), ("rate", 0.9.into())] {
             let mut json = serde_json::to_value(cell()).unwrap();
             json[field] = value;

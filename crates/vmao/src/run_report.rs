@@ -6,7 +6,7 @@ use crate::dataset;
 use crate::evaluation::{Evaluation, TrialLine};
 use crate::failure::{Failure, OrBadInput};
 use crate::json::Document;
-use crate::learning::{curves, json_lines, load};
+use crate::learning::{curves, json_lines, load_methods};
 use crate::output::write_whole;
 use crate::provenance::RunInfo;
 use crate::report::{
@@ -21,6 +21,7 @@ use std::path::{Path, PathBuf};
 use vmao_core::catalogue::InstanceSet;
 use vmao_core::order::GraspOrder;
 use vmao_core::outcome::TrialOutcome;
+use vmao_net::ModelKind;
 use vmao_sim::Recording;
 
 /// Latent codes shown for each scene, as in the supplement's Figure 4.
@@ -33,16 +34,10 @@ pub fn write_report(directory: &Path) -> Result<PathBuf, Failure> {
     let results: Results = Document::read(&directory.join("results.json")).or_bad_input()?.parse().or_bad_input()?;
     let lines: Vec<TrialLine> = json_lines(&directory.join("trials.jsonl"))?;
     let models = directory.join("models");
-    let mut methods = Vec::new();
-    for method in [Method::Vmao, Method::Top1] {
-        if models.join(method.name()).is_dir() {
-            methods.push(load(&models.join(method.name()), crate::scenes::grasps(&config)?)?);
-        }
-    }
-    let evaluation = Evaluation::new(&config, info.seed, methods)?;
+    let evaluation = Evaluation::new(&config, info.seed, load_methods(&models, &config)?)?;
     let (exploration, digest) = explored(&config, &directory.join("data"))?;
     let data = ReportData {
-        title: format!("vmao · {} with {}", config.object.name, config.robots.names.join(" + ")),
+        title: format!("vmao · {} with {}", config.object_name(), config.robots.names.join(" + ")),
         summary: summary(&results),
         cells: cells(&results, &lines)?,
         contact_maps: contact_maps(&evaluation, &lines, info.seed)?,
@@ -68,7 +63,9 @@ fn summary(results: &Results) -> String {
     let cell = |cell: &crate::results::Cell| {
         format!("{} {}: {} of {}", cell.method().title(), cell.order().name(), cell.successes(), cell.trials())
     };
-    format!("Trials that met the goal pose and joint angles. {}.", results.cells.iter().map(cell).collect::<Vec<_>>().join("; "))
+    let cells = results.cells.iter().map(cell).collect::<Vec<_>>().join("; ");
+    let goals = results.goals().map_or_else(String::new, |counts| format!(" Of all, {}.", counts.sentence()));
+    format!("Trials that met the goal pose and joint angles. {cells}.{goals}")
 }
 
 /// The cells of the table, each with its success rate over scaled thresholds.
@@ -136,18 +133,18 @@ fn rollouts(evaluation: &Evaluation<'_>, lines: &[TrialLine]) -> Vec<RolloutFigu
 
 fn training(models: &Path) -> Result<Vec<TrainingCurve>, Failure> {
     let mut all = Vec::new();
-    for method in [Method::Vmao, Method::Top1] {
-        let lines = curves(&models.join(method.name()))?;
+    for kind in ModelKind::ALL {
+        let lines = curves(&models.join(kind.name()))?;
         let grasps = lines.iter().map(|line| line.grasp + 1).max().unwrap_or(0);
         for grasp in 0..grasps {
             let epoch = |line: &crate::learning::EpochLine| TrainingEpoch {
                 train_reconstruction: f64::from(line.train_reconstruction),
                 validation_reconstruction: line.validation_reconstruction.map_or(f64::NAN, f64::from),
-                kl: if method == Method::Vmao { f64::from(line.train_kl) } else { f64::NAN },
-                beta: if method == Method::Vmao { f64::from(line.beta) } else { f64::NAN },
+                kl: if kind == ModelKind::Vmao { f64::from(line.train_kl) } else { f64::NAN },
+                beta: if kind == ModelKind::Vmao { f64::from(line.beta) } else { f64::NAN },
             };
             let epochs = lines.iter().filter(|line| line.grasp == grasp).map(epoch).collect();
-            all.push(TrainingCurve { model: format!("{}, grasp {}", method.title(), grasp + 1), epochs });
+            all.push(TrainingCurve { model: format!("{}, grasp {}", kind.title(), grasp + 1), epochs });
         }
     }
     Ok(all)

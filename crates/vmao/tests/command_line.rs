@@ -46,6 +46,10 @@ fn bad_usage_and_bad_input_exit_with_two_and_say_what_exists() {
     check_refused(&["robot", "meshes", "panda", "--from", ".", "--out", "o"], "no model of `panda` with meshes below ");
     check_refused(&["scene", "--meshes", "none", "--out", "a.xml"], "error: none/meshes.json: cannot be read: ");
     check_refused(&["ocao", "a.json", "--config", "none.toml"], "none.toml: cannot be read: ");
+    check_refused(
+        &["scene", "--out", "o.xml", "--set", "object.root=jaw"],
+        "object.root: object `pliers` has no part `jaw`; a root is one of: first, auto, lever-a, lever-b",
+    );
 }
 
 #[test]

@@ -40,7 +40,7 @@ impl RobotModel {
     }
 
     /// Solids of the hand and of both fingers, in the frame of the arm's last link.
-    fn gripper_solids(&self, opening: f64) -> (Vec<Solid>, Vec<Solid>) {
+    pub(crate) fn gripper_solids(&self, opening: f64) -> (Vec<Solid>, Vec<Solid>) {
         let gripper = &self.gripper;
         let place =
             |carrier: Pose, solid: &Solid| Solid { carrier_from_solid: carrier * solid.carrier_from_solid, ..solid.clone() };

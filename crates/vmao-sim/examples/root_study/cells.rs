@@ -19,9 +19,11 @@ const fn cell(object: &'static str, layout: Layout, order: GraspOrder) -> Cell {
 }
 
 /// Two levers on one pin, a hinge at an edge, a chain, a frame with two branches, a body with a hinge and a slide.
-pub(crate) const CELLS: [Cell; 8] = [
+pub(crate) const CELLS: [Cell; 10] = [
     cell("pliers", Layout::Opposed, GraspOrder::Parallel),
+    cell("pliers", Layout::Opposed, GraspOrder::Sequential),
     cell("laptop", Layout::Opposed, GraspOrder::Parallel),
+    cell("laptop", Layout::Opposed, GraspOrder::Sequential),
     cell("three-sticks-chain", Layout::Ring, GraspOrder::Parallel),
     cell("three-sticks-chain", Layout::Ring, GraspOrder::Sequential),
     cell("eyeglasses", Layout::Ring, GraspOrder::Parallel),

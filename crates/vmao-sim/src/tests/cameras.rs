@@ -6,7 +6,9 @@ use crate::cameras::{CameraConfig, TABLE_PLANE_HEIGHT, observe};
 use crate::convention::body_pose;
 use crate::scene::Scene;
 use crate::simulation::Simulation;
+use crate::viewpoints::Viewpoint;
 use nalgebra::Point3;
+use vmao_core::depth_noise::DepthNoise;
 use vmao_core::distance::Convex;
 use vmao_core::geometry::Pose;
 use vmao_core::observation::{Observation, PointLabel};
@@ -154,4 +156,59 @@ fn the_same_stream_gives_the_same_cloud_and_another_gives_another() {
     assert_eq!(first, look(&mut simulation, &config.cameras, 5));
     assert_ne!(first, look(&mut simulation, &config.cameras, 6));
     assert_eq!(first, look(&mut settled(&scene, 1), &config.cameras, 5), "another simulation in the same state");
+}
+
+#[test]
+fn a_perfect_camera_draws_nothing_and_a_noisy_one_leaves_labels_and_moves_points_along_their_rays() {
+    let (_, config) = configuration();
+    let scene = scene(0);
+    let mut simulation = settled(&scene, 2);
+    let everything = CameraConfig { points: 65_536, ..config.cameras.clone() };
+    let with = |noise: DepthNoise| CameraConfig { noise, ..everything.clone() };
+    let off = DepthNoise { edge_step: 0.01, ..DepthNoise::default() };
+    let perfect = look(&mut simulation, &everything, 1);
+    assert_eq!(perfect, look(&mut simulation, &with(off), 1));
+    let solids = solids(&scene, &simulation);
+    let noisy = look(&mut simulation, &with(DepthNoise { deviation: 0.0014, ..off }), 1);
+    let mut squares = 0.0;
+    for (point, &label) in noisy.points.iter().zip(&noisy.labels) {
+        // Off its surface by no more than along its ray: the distance to the true surface has at most the depth's deviation.
+        let distance = distance_to_label(&Point3::from(point.map(f64::from)), label, &solids);
+        squares += distance * distance / noisy.len() as f64;
+        assert!(distance < 0.0014 * 6.0, "{label:?} is {distance} m from its surface");
+    }
+    assert!((2e-4..1.4e-3).contains(&squares.sqrt()), "{} m off the surfaces", squares.sqrt());
+    let lossy = look(&mut simulation, &with(DepthNoise { dropout: 0.25, ..off }), 1);
+    let kept = lossy.len() as f64 / perfect.len() as f64;
+    assert!((kept - 0.75).abs() < 5.0 * (0.1875 / perfect.len() as f64).sqrt(), "{kept} of the points are kept");
+    let edgeless = look(&mut simulation, &with(DepthNoise { edge_dropout: 1.0, ..off }), 1);
+    assert!(edgeless.len() < perfect.len() && edgeless.len() > perfect.len() / 2, "{} of {}", edgeless.len(), perfect.len());
+}
+
+#[test]
+fn cameras_stand_where_they_are_put() {
+    let (_, config) = configuration();
+    let scene = scene(0);
+    let mut simulation = settled(&scene, 2);
+    let with = |viewpoints: &[([f64; 3], [f64; 3])]| CameraConfig {
+        viewpoints: viewpoints.iter().map(|&(position, target)| Viewpoint { position, target }).collect(),
+        points: 65_536,
+        ..config.cameras.clone()
+    };
+    // Straight down, nothing below what it sees first is seen: no two points lie on one vertical ray.
+    let above = look(&mut simulation, &with(&[([0.0, 0.0, 1.5], [0.0, 0.0, 0.0])]), 1);
+    assert!(above.len() > 1000);
+    let low = above.points.iter().map(|point| point[0].hypot(point[1])).fold(0.0_f32, f32::max);
+    assert!(low > 0.3, "the whole workspace is seen");
+    // Those of the ring, put there by hand, see the same.
+    let cameras = &config.cameras;
+    let by_hand: Vec<([f64; 3], [f64; 3])> = (0..cameras.count)
+        .map(|camera| {
+            let azimuth = std::f64::consts::TAU * (camera as f64 + 0.5) / cameras.count as f64;
+            let height = cameras.elevations[camera % cameras.elevations.len()];
+            ([cameras.distance * azimuth.cos(), cameras.distance * azimuth.sin(), height], [0.0, 0.0, 0.05])
+        })
+        .collect();
+    let ring = CameraConfig { points: 65_536, ..cameras.clone() };
+    assert_eq!(look(&mut simulation, &with(&by_hand), 1), look(&mut simulation, &ring, 1));
 }

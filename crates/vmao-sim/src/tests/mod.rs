@@ -4,6 +4,7 @@ mod cameras;
 mod catalogue;
 mod control;
 mod dependency_root;
+mod hulls;
 mod imported;
 mod internal_forces;
 mod inverse_kinematics;
@@ -11,6 +12,8 @@ mod kinematics;
 mod link_meshes;
 mod object_trees;
 mod rays;
+mod reachability;
+mod runaways;
 mod starts_and_goals;
 #[path = "../../tests/support/mod.rs"]
 mod support;

@@ -2,9 +2,8 @@
 #![allow(dead_code, reason = "each test binary uses its own share of this module")]
 #![allow(clippy::unwrap_used, clippy::panic, reason = "a test that cannot go on has failed")]
 
-use nalgebra::Point3;
 use vmao_core::catalogue::{InstanceSet, item};
-use vmao_core::contact_model::{ContactModel, ContactQuery, FixedTuple};
+use vmao_core::contact_model::{ContactModel, ContactQuery, FingerPoints, FixedTuple};
 use vmao_core::order::GraspOrder;
 use vmao_core::osc::OscGains;
 use vmao_core::outcome::{FailureStage, TrialOutcome};
@@ -33,8 +32,18 @@ struct Shipped {
 
 /// The scene's and the trials' configuration: the shipped one.
 pub(crate) fn configuration() -> (SceneConfig, TrialConfig) {
-    let Shipped { scene, start, goal, thresholds, cameras, grasp, motion, osc } =
-        toml::from_str(include_str!("../../../../configs/demo.toml")).unwrap();
+    configuration_with(&[])
+}
+
+/// The same with some keys (`section.key`) set to other values, as TOML writes them.
+pub(crate) fn configuration_with(settings: &[(&str, &str)]) -> (SceneConfig, TrialConfig) {
+    let mut shipped: toml::Table = include_str!("../../../../configs/demo.toml").parse().unwrap();
+    for (path, value) in settings {
+        let (section, key) = path.split_once('.').unwrap();
+        let value: toml::Table = format!("{key} = {value}").parse().unwrap();
+        shipped[section].as_table_mut().unwrap().extend(value);
+    }
+    let Shipped { scene, start, goal, thresholds, cameras, grasp, motion, osc } = shipped.try_into().unwrap();
     (scene, TrialConfig { start, goal, thresholds, cameras, grasp, motion, osc })
 }
 
@@ -97,15 +106,21 @@ pub(crate) fn failed_at(trial: &Trial) -> FailureStage {
 }
 
 /// Proposes the same world points for the grasps of all parts, or nothing.
-pub(crate) struct WorldPoints(pub(crate) Option<[Point3<f64>; 2]>);
+pub(crate) struct WorldPoints(pub(crate) Option<FingerPoints>);
 
 impl ContactModel for WorldPoints {
-    fn propose(&self, _query: &ContactQuery<'_>, _stream: &mut Stream) -> Option<[Point3<f64>; 2]> {
-        self.0
+    fn propose(&self, _query: &ContactQuery<'_>, _stream: &mut Stream) -> Vec<FingerPoints> {
+        self.0.into_iter().collect()
     }
 }
 
 /// Cameras that hardly look: for trials that end before anything is grasped.
 pub(crate) fn with_tiny_cameras(config: &TrialConfig) -> TrialConfig {
     TrialConfig { cameras: CameraConfig { width: 8, height: 6, ..config.cameras.clone() }, ..config.clone() }
+}
+
+/// CPU time of the calling thread (s), as Linux counts it.
+pub(crate) fn thread_seconds() -> f64 {
+    let text = std::fs::read_to_string("/proc/thread-self/schedstat").unwrap_or_default();
+    text.split_whitespace().next().and_then(|nanoseconds| nanoseconds.parse::<f64>().ok()).unwrap_or(f64::NAN) * 1e-9
 }

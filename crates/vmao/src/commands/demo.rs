@@ -5,12 +5,15 @@ use crate::{
     dataset::{self, DatasetWriter},
     exploration::explore,
     failure::Failure,
+    interruption::keeps,
     learning::{load, train_all},
     output::{Layout, log, print},
     run_report::write_report,
+    scenes::grasps,
 };
 use serde::Serialize;
 use std::path::{Path, PathBuf};
+use vmao_net::ModelKind;
 
 #[derive(Debug, clap::Args)]
 pub(super) struct DemoArguments {
@@ -37,16 +40,25 @@ pub(super) fn run(_arguments: &DemoArguments, mut session: Session) -> Result<()
         let data = directory.join("data");
         let writer = DatasetWriter::open(&data)?;
         session.save(&data)?;
-        let explored = explore(config, seed, &writer)?;
+        let explored = explore(config, &session.info, &writer, None)?;
         log(&format!("explored: {} of {} trials accepted", explored.successes, explored.trials));
         let records = dataset::load(&data)?;
+        let (place, config_file) = (directory.display(), directory.join("config.toml"));
+        keeps(format!(
+            "the explored data set is kept in {}, finished networks in {place}/models; go on with `vmao train` and `vmao evaluate`, each \
+             with --config {}",
+            data.display(),
+            config_file.display()
+        ));
         let mut models = Vec::new();
-        for &method in &config.evaluate.methods {
-            let place = directory.join("models").join(method.name());
-            train_all(config, method, &records, seed, &place)?;
-            models.push(load(&place, crate::scenes::grasps(&session.config)?)?);
+        for kind in ModelKind::ALL {
+            if config.evaluate.methods.iter().any(|method| method.model() == kind) {
+                let place = directory.join("models").join(kind.name());
+                train_all(config, kind, &records, seed, &place)?;
+                models.push(load(&place, grasps(config)?)?);
+            }
         }
-        let results = table(&session, models, &directory)?;
+        let results = table(&session, &models, &directory)?;
         Ok((results, write_report(&directory)?))
     })?;
     match session.layout {

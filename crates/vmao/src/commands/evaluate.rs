@@ -4,12 +4,15 @@ use super::{CommonOptions, Session};
 use crate::{
     evaluation::{Evaluation, save},
     failure::{Failure, OrBadInput},
+    interruption::keeps,
+    learned_contacts::methods,
     learning::{copy, load},
     output::{Layout, print},
-    results::{Method, Results},
+    results::Results,
 };
 use std::path::{Path, PathBuf};
 use vmao_core::order::GraspOrder;
+use vmao_net::{ContactNetwork, ModelKind};
 
 #[derive(Debug, clap::Args)]
 pub(super) struct EvaluateArguments {
@@ -40,20 +43,21 @@ pub(super) fn run(arguments: &EvaluateArguments, mut session: Session) -> Result
         }
     })?;
     let grasps = crate::scenes::grasps(&session.config)?;
-    let places: Vec<PathBuf> = [Method::Vmao, Method::Top1].map(|method| arguments.checkpoint.join(method.name())).into();
+    let places: Vec<PathBuf> = ModelKind::ALL.map(|kind| arguments.checkpoint.join(kind.name())).into();
     let mut places: Vec<PathBuf> = places.into_iter().filter(|place| place.is_dir()).collect();
     if places.is_empty() {
         places.push(arguments.checkpoint.clone());
     }
     let models = places.iter().map(|place| load(place, grasps)).collect::<Result<Vec<_>, _>>()?;
     let directory = session.output_directory(Path::new("runs/evaluate"))?;
-    for (place, (method, _)) in places.iter().zip(&models) {
-        let kept = directory.join("models").join(method.name());
+    for (place, (kind, _)) in places.iter().zip(&models) {
+        let kept = directory.join("models").join(kind.name());
         if place.canonicalize().or_bad_input()? != kept.canonicalize().unwrap_or_default() {
             copy(place, &kept, grasps)?;
         }
     }
-    let results = session.pool()?.install(|| table(&session, models, &directory))?;
+    keeps(format!("the networks are kept in {}, trials of an unfinished table are not; run it again", directory.display()));
+    let results = session.pool()?.install(|| table(&session, &models, &directory))?;
     match session.layout {
         Layout::Line => session.print(&results),
         Layout::Indented => Ok(print(results.table().trim_end())?),
@@ -63,10 +67,18 @@ pub(super) fn run(arguments: &EvaluateArguments, mut session: Session) -> Result
 /// Runs the configured cells and writes their results.
 pub(super) fn table(
     session: &Session,
-    models: Vec<(Method, crate::learned_contacts::LearnedContacts)>,
+    models: &[(ModelKind, Vec<ContactNetwork>)],
     directory: &Path,
 ) -> Result<Results, Failure> {
-    let evaluation = Evaluation::new(&session.config, session.info.seed, models)?;
+    let config = &session.config;
+    let methods = methods(&config.evaluate, models);
+    if methods.is_empty() {
+        let found: Vec<&str> = models.iter().map(|(kind, _)| kind.name()).collect();
+        let asked: Vec<&str> = config.evaluate.methods.iter().map(|method| method.name()).collect();
+        let (found, asked) = (found.join(", "), asked.join(", "));
+        return Err(Failure::bad_input(format!("evaluate.methods: {asked}, and none of them uses the checkpoint's {found}")));
+    }
+    let evaluation = Evaluation::new(config, session.info.seed, methods)?;
     let lines = evaluation.run();
     let results = evaluation.results(&session.info, &lines);
     save(directory, &lines, &results)?;

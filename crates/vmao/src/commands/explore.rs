@@ -5,6 +5,7 @@ use crate::{
     dataset::DatasetWriter,
     exploration::explore,
     failure::{Failure, OrBadInput},
+    sharing::Share,
 };
 use std::path::Path;
 
@@ -19,6 +20,9 @@ pub(super) struct ExploreArguments {
     /// Go on with the data set that is there
     #[arg(long)]
     resume: bool,
+    /// Run part i of n of every round; all parts in one --out, on one file system; `vmao dataset merge` puts them together
+    #[arg(long, value_name = "I/N")]
+    shard: Option<Share>,
     #[command(flatten)]
     pub(super) common: CommonOptions,
 }
@@ -28,7 +32,8 @@ pub(super) fn run(arguments: &ExploreArguments, mut session: Session) -> Result<
         config.explore.successes = arguments.successes.unwrap_or(config.explore.successes);
         config.explore.max_trials = arguments.max_trials.unwrap_or(config.explore.max_trials);
     })?;
-    let directory = session.out.clone().unwrap_or_else(|| Path::new("runs/explore").to_owned());
+    let place = session.out.clone().unwrap_or_else(|| Path::new("runs/explore").to_owned());
+    let directory = arguments.shard.map_or_else(|| place.clone(), |share| share.directory(&place));
     if arguments.resume {
         session.info.check_same_run(&directory).or_bad_input()?;
     }
@@ -41,6 +46,7 @@ pub(super) fn run(arguments: &ExploreArguments, mut session: Session) -> Result<
         }
         session.save(&directory)?;
     }
-    let explored = session.pool()?.install(|| explore(&session.config, session.info.seed, &writer))?;
+    let shared = arguments.shard.map(|share| (share, &*place));
+    let explored = session.pool()?.install(|| explore(&session.config, &session.info, &writer, shared))?;
     session.print(&explored)
 }

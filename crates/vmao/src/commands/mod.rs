@@ -3,6 +3,7 @@
 //! To add a command: a module here with its `clap::Args` (flatten [`CommonOptions`] into it) and
 //! `pub(super) fn run(arguments, &Session) -> Result<(), Failure>`, and its line in `Command` and in `execute`.
 
+mod dataset;
 mod demo;
 mod evaluate;
 mod explore;
@@ -17,11 +18,13 @@ mod sample;
 mod scene;
 mod session;
 mod train;
+mod verify;
 
 pub use session::{CommonOptions, Session};
 
 use crate::{
     failure::{Failure, silence_contained_panics},
+    interruption::heed,
     output::{log, print},
 };
 use clap::{Parser, Subcommand};
@@ -45,6 +48,8 @@ enum Command {
     Object(object::ObjectArguments),
     /// Algorithm 1: grow a label set from demonstrations, in physics
     Explore(explore::ExploreArguments),
+    /// Data sets: merge those of shards, say what is in one, show a trial
+    Dataset(dataset::DatasetArguments),
     /// Train contact networks on an explored data set
     Train(train::TrainArguments),
     /// Contact maps of a trained model on scenes that were never explored, as PLY and a page
@@ -53,6 +58,8 @@ enum Command {
     Evaluate(evaluate::EvaluateArguments),
     /// report.html of a run
     Report(report::ReportArguments),
+    /// Run recorded trials again and compare them bit for bit
+    Verify(verify::VerifyArguments),
     /// Meshes of the robots, for pictures
     Robot(robot::RobotArguments),
     /// The simulated scene as MJCF
@@ -65,7 +72,7 @@ enum Command {
     Plan(plan::PlanArguments),
 }
 
-/// Runs the program on these arguments, its own name first: 0 done, 1 the work failed, 2 bad input or usage.
+/// Runs the program on these arguments, its own name first: 0 done, 1 the work failed, 2 bad input or usage, 130 Ctrl-C.
 pub fn main(arguments: impl IntoIterator<Item = OsString>) -> ExitCode {
     silence_contained_panics();
     let arguments: Vec<OsString> = arguments.into_iter().collect();
@@ -78,6 +85,9 @@ pub fn main(arguments: impl IntoIterator<Item = OsString>) -> ExitCode {
         // `--help` and `--version` are answers.
         Err(message) => return finish(print(message.render().to_string().trim_end()).map_err(Failure::from)),
     };
+    if let Err(error) = heed() {
+        return finish(Err(Failure::Work(error.into())));
+    }
     let arguments: Vec<String> = arguments.iter().map(|argument| argument.to_string_lossy().into_owned()).collect();
     let result = execute(line.command, &arguments);
     if let Some(seconds) = vmao_sim::profile::seconds() {
@@ -102,10 +112,12 @@ fn execute(command: Command, command_line: &[String]) -> Result<(), Failure> {
         Command::Demo(arguments) => demo::run(&arguments, session(&arguments.common)?),
         Command::Object(arguments) => object::run(&arguments, &session(arguments.action.common())?),
         Command::Explore(arguments) => explore::run(&arguments, session(&arguments.common)?),
+        Command::Dataset(arguments) => dataset::run(&arguments, &session(arguments.action.common())?),
         Command::Train(arguments) => train::run(&arguments, &session(&arguments.common)?),
         Command::Sample(arguments) => sample::run(&arguments, &session(&arguments.common)?),
         Command::Evaluate(arguments) => evaluate::run(&arguments, session(&arguments.common)?),
         Command::Report(arguments) => report::run(&arguments, &session(&arguments.common)?),
+        Command::Verify(arguments) => verify::run(&arguments, &session(&arguments.common)?),
         Command::Robot(arguments) => robot::run(&arguments, &session(arguments.action.common())?),
         Command::Scene(arguments) => scene::run(&arguments, &session(&arguments.common)?),
         Command::Ik(arguments) => ik::run(&arguments, &session(&arguments.common)?),

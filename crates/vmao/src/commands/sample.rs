@@ -5,9 +5,12 @@ use crate::{
     contact_maps::{latent_maps, ply},
     evaluation::Evaluation,
     failure::Failure,
+    learned_contacts::LearnedContacts,
     learning::load,
     output::write_whole,
     report::{ContactMapFigure, Provenance, ReportData, render},
+    results::Method,
+    scenes::grasps,
 };
 use anyhow::Context;
 use serde_json::json;
@@ -17,6 +20,7 @@ use std::{
     path::{Path, PathBuf},
 };
 use vmao_core::{order::GraspOrder, record::GraspRecord};
+use vmao_net::ModelKind;
 use vmao_sim::Recording;
 
 /// Trials carried out at most for each scene that is asked for; those that fail before the grasp show nothing.
@@ -41,7 +45,12 @@ pub(super) struct SampleArguments {
 }
 
 pub(super) fn run(arguments: &SampleArguments, session: &Session) -> Result<(), Failure> {
-    let (method, model) = load(&arguments.checkpoint, crate::scenes::grasps(&session.config)?)?;
+    let (kind, networks) = load(&arguments.checkpoint, grasps(&session.config)?)?;
+    let method = match kind {
+        ModelKind::Vmao => Method::Vmao,
+        ModelKind::Top1 => Method::Top1,
+    };
+    let model = LearnedContacts { networks, samples: 1 };
     let grasp = arguments.grasp as usize - 1;
     if grasp >= model.networks.len() {
         let found = arguments.grasp;
@@ -81,7 +90,7 @@ pub(super) fn run(arguments: &SampleArguments, session: &Session) -> Result<(), 
     }
     let info = &session.info;
     let data = ReportData {
-        title: format!("vmao · contact maps of {}", session.config.object.name),
+        title: format!("vmao · contact maps of {}", session.config.object_name()),
         summary: format!("{} maps of {} scenes by {}.", written.len(), figures.len(), method.title()),
         contact_maps: figures,
         provenance: Provenance {
@@ -101,12 +110,6 @@ pub(super) fn run(arguments: &SampleArguments, session: &Session) -> Result<(), 
 }
 
 /// What is seen before `grasp` of a trial; none if the trial failed before.
-fn look(
-    evaluation: &Evaluation<'_>,
-    method: crate::results::Method,
-    order: GraspOrder,
-    index: u64,
-    grasp: usize,
-) -> Option<GraspRecord> {
+fn look(evaluation: &Evaluation<'_>, method: Method, order: GraspOrder, index: u64, grasp: usize) -> Option<GraspRecord> {
     evaluation.trial(order, method, index, Recording::Off)?.record.grasps.into_iter().nth(grasp)
 }

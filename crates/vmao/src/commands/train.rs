@@ -4,11 +4,12 @@ use super::{CommonOptions, Session};
 use crate::{
     dataset,
     failure::{Failure, OrBadInput},
+    interruption::keeps,
     learning::train_all,
-    results::Method,
 };
 use serde::Serialize;
 use std::path::{Path, PathBuf};
+use vmao_net::ModelKind;
 
 #[derive(Debug, clap::Args)]
 pub(super) struct TrainArguments {
@@ -45,16 +46,17 @@ struct Validation {
 }
 
 pub(super) fn run(arguments: &TrainArguments, session: &Session) -> Result<(), Failure> {
-    let method = match arguments.model {
-        Model::Vmao => Method::Vmao,
-        Model::Top1 => Method::Top1,
+    let kind = match arguments.model {
+        Model::Vmao => ModelKind::Vmao,
+        Model::Top1 => ModelKind::Top1,
     };
     let records = dataset::load(&arguments.data).or_bad_input()?;
     if records.is_empty() {
         return Err(Failure::bad_input(format!("{}: no trials, expected a data set", arguments.data.display())));
     }
-    let directory = session.output_directory(&Path::new("runs/train").join(method.name()))?;
-    let lines = session.pool()?.install(|| train_all(&session.config, method, &records, session.info.seed, &directory))?;
+    let directory = session.output_directory(&Path::new("runs/train").join(kind.name()))?;
+    keeps(format!("the data set is kept, networks that were finished are in {}; run it again", directory.display()));
+    let lines = session.pool()?.install(|| train_all(&session.config, kind, &records, session.info.seed, &directory))?;
     let last = |grasp: usize| lines.iter().rfind(|line| line.grasp == grasp);
     let validation = (0..crate::scenes::grasps(&session.config)?)
         .filter_map(last)

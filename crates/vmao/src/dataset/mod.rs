@@ -117,7 +117,7 @@ pub fn found_files(directory: &Path) -> Result<Vec<RoundFile>, DatasetError> {
         let numbers = range.and_then(|(first, last)| Some((first.parse().ok()?, last.parse().ok()?)));
         match numbers {
             Some((first, last)) if first <= last && name == round_name(first, last) => {
-                files.push(RoundFile { first, last, path })
+                files.push(RoundFile { first, last, path });
             }
             _ => return Err(refuse(format!("file `{}`, expected names like {}", name.escape_debug(), round_name(0, 15)))),
         }
