@@ -77,3 +77,16 @@ fn what_is_refused_leaves_nothing() {
     check_refused(&import(&[path, "--out", "o"]), "textured_objs/original-1.obj: line 2: a face names `2`");
     assert_eq!(fs::read_dir(out.path()).unwrap().count(), 0);
 }
+
+#[test]
+fn an_imported_object_is_explored_as_any_other() {
+    let chest = Chest::new();
+    let out = tempfile::tempdir().unwrap();
+    let path = chest.path().to_str().unwrap();
+    answer(&vmao(out.path(), &["object", "import", path, "--out", "chest", "--json"]));
+    let name = "object.name=\"chest/object.json\"";
+    let explore = ["explore", "--set", name, "--max-trials", "2", "--out", "data", "--json", "--set", "explore.round_size=2"];
+    let found = answer(&vmao(out.path(), &explore));
+    assert_eq!(found["trials"], 2);
+    assert_eq!(found["digest"].as_str().unwrap().len(), 64);
+}
