@@ -40,7 +40,8 @@ fn main() -> Result<(), Box<dyn Error>> {
 fn row(object: &str, robot: &RobotModel, order: GraspOrder, costs: &[Cost]) -> String {
     let (successes, failures): (Vec<&Cost>, Vec<&Cost>) = costs.iter().partition(|cost| cost.outcome.is_success());
     let mean = |of: &[&Cost], value: fn(&Cost) -> f64| of.iter().map(|cost| value(cost)).sum::<f64>() / of.len() as f64;
-    let (cpu, steps): (fn(&Cost) -> f64, fn(&Cost) -> f64) = (|cost| cost.seconds, |cost| cost.steps as f64);
+    let cpu: fn(&Cost) -> f64 = |cost| cost.seconds;
+    let steps: fn(&Cost) -> f64 = |cost| cost.steps as f64;
     let shown = |value: f64| if value.is_finite() { format!("{value:.2}") } else { "–".to_owned() };
     let mut stages: Vec<(&str, usize)> = Vec::new();
     for cost in costs {
