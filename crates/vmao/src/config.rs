@@ -230,7 +230,7 @@ impl Config {
 
     /// Refuses sizes of an object that do not have the same parts and joints.
     fn check_sizes(&self) -> Result<(), String> {
-        let ObjectConfig { name, sizes, held_out } = &self.object;
+        let ObjectConfig { name, sizes, held_out, .. } = &self.object;
         let others = || sizes.iter().chain(held_out);
         let Some(first) = self.inputs.object(name) else {
             let none = others().next().is_none();

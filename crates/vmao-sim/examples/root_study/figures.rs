@@ -4,7 +4,6 @@ use crate::cells::CELLS;
 use crate::study::{Study, paired_ratio};
 use crate::tables::{MEASURES, wilson};
 use std::error::Error;
-use std::fmt::Write;
 use std::fs;
 use vmao_core::catalogue::InstanceSet;
 
@@ -33,15 +32,15 @@ fn page(width: f64, height: f64, body: &str) -> String {
 }
 
 fn text(body: &mut String, x: f64, y: f64, anchor: &str, words: &str) {
-    let _ = writeln!(body, "<text x=\"{x:.1}\" y=\"{y:.1}\" text-anchor=\"{anchor}\">{words}</text>");
+    *body += &format!("<text x=\"{x:.1}\" y=\"{y:.1}\" text-anchor=\"{anchor}\">{words}</text>\n");
 }
 
 fn line(body: &mut String, [x1, y1]: [f64; 2], [x2, y2]: [f64; 2], color: &str) {
-    let _ = writeln!(body, "<line x1=\"{x1:.1}\" y1=\"{y1:.1}\" x2=\"{x2:.1}\" y2=\"{y2:.1}\" stroke=\"{color}\"/>");
+    *body += &format!("<line x1=\"{x1:.1}\" y1=\"{y1:.1}\" x2=\"{x2:.1}\" y2=\"{y2:.1}\" stroke=\"{color}\"/>\n");
 }
 
 fn dot(body: &mut String, x: f64, y: f64, radius: f64, color: &str) {
-    let _ = writeln!(body, "<circle cx=\"{x:.1}\" cy=\"{y:.1}\" r=\"{radius}\" fill=\"{color}\"/>");
+    *body += &format!("<circle cx=\"{x:.1}\" cy=\"{y:.1}\" r=\"{radius}\" fill=\"{color}\"/>\n");
 }
 
 /// Writes `dependency-root.svg` and `dependency-root-prediction.svg`.

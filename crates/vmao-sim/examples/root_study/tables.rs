@@ -16,8 +16,10 @@ pub(crate) fn wilson(successes: usize, trials: usize) -> [f64; 2] {
     [middle - half, middle + half].map(|bound| 100.0 * bound.clamp(0.0, 1.0))
 }
 
-/// What is measured of a motion: name, unit of which `scale` make one, decimals.
-pub(crate) const MEASURES: [(&str, fn(&MotionMeasures) -> f64, f64, usize); 6] = [
+/// What is measured of a motion: name with unit, value, how many of its own units make one of that, decimals.
+type Measure = (&'static str, fn(&MotionMeasures) -> f64, f64, usize);
+
+pub(crate) const MEASURES: [Measure; 6] = [
     ("hands' ways (m)", |motion| motion.hand_path, 1.0, 3),
     ("longest way (m)", |motion| motion.longest_hand_path, 1.0, 3),
     ("joints (rad)", |motion| motion.joint_travel, 1.0, 2),

@@ -173,7 +173,8 @@ fn predicted_ways_are_those_of_plain_motions() {
     };
     let weight = 9.81 * object.parts.iter().map(|part| part.mass).sum::<f64>();
     assert!(moment(1) < 0.7 * moment(0), "a chain is lighter by its middle: {} and {} N·m", moment(1), moment(0));
-    assert!((0.10..0.16).contains(&(moment(0) / weight)), "held by its end, {} m from its middle", moment(0) / weight);
+    // Nearly straight: half the middle stick, and three quarters of the end stick.
+    assert!((0.15..0.17).contains(&(moment(0) / weight)), "held by its end, {} m from its middle", moment(0) / weight);
     // A hinge that turns by half a turn about the standing root takes its hand along a half circle.
     let still = Pose::translation(0.0, 0.0, 0.02);
     let turned = ObjectGoal { root: PartId(0), world_from_root: still, joint_positions: vec![0.0, 1.0] };
