@@ -92,7 +92,10 @@ pub struct Window {
 impl Window {
     /// What both hold.
     pub fn intersection(&self, other: &Self) -> Self {
-        let both = |a: &Range<usize>, b: &Range<usize>| a.start.max(b.start)..a.end.min(b.end);
+        let both = |a: &Range<usize>, b: &Range<usize>| {
+            let start = a.start.max(b.start);
+            start..a.end.min(b.end).max(start)
+        };
         Self { rows: both(&self.rows, &other.rows), columns: both(&self.columns, &other.columns) }
     }
 }

@@ -43,6 +43,7 @@ pub mod shape;
 mod small_systems;
 mod swept;
 pub mod time_parameterization;
+pub mod wording;
 
 /// The code in the README, compiled and run with the documentation tests.
 #[cfg(doctest)]

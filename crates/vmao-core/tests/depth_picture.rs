@@ -45,14 +45,18 @@ fn depth(camera: &Pinhole, row: usize, column: usize, shape: &Shape, world_from_
 
 proptest! {
     #[test]
-    fn a_picture_shows_at_each_pixel_the_nearest_of_all_solids(camera in camera(), solids in prop::collection::vec(placed(), 1..6)) {
-        let everywhere = Window { rows: 0..camera.height, columns: 0..camera.width };
+    fn a_picture_shows_at_each_pixel_of_its_window_the_nearest_of_all_solids(
+        camera in camera(),
+        solids in prop::collection::vec(placed(), 1..6),
+        (top, left, rows, columns) in (0..17_usize, 0..23_usize, 1..17_usize, 1..23_usize),
+    ) {
+        let window = Window { rows: top..(top + rows).min(camera.height), columns: left..(left + columns).min(camera.width) };
         let mut picture = DepthPicture::new(&camera);
         for (index, (shape, pose)) in (0..).zip(&solids) {
-            picture.add_solid(&camera, &everywhere, index, shape, pose);
+            picture.add_solid(&camera, &window, index, shape, pose);
         }
-        for row in 0..camera.height {
-            for column in 0..camera.width {
+        for row in window.rows.clone() {
+            for column in window.columns.clone() {
                 let all = solids.iter().map(|(shape, pose)| depth(&camera, row, column, shape, pose));
                 let nearest = all.flatten().fold(f64::INFINITY, f64::min);
                 let seen = picture.at(row, column).map_or(f64::INFINITY, |(_, depth)| depth);

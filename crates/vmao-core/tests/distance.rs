@@ -1,4 +1,6 @@
 //! Signed distances against closed forms and against an independent slow search.
+#![expect(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
+#![expect(clippy::needless_pass_by_value, reason = "tests build what they compare in the call")]
 
 mod slow;
 

@@ -1,4 +1,5 @@
 //! Object files: every catalogue object survives the way through one, and whatever is wrong is refused with its place.
+#![expect(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
 use serde_json::{Value, json};
 use vmao_core::{
@@ -109,7 +110,7 @@ fn whatever_is_wrong_is_refused_with_its_place() {
             "3 vertices, expected 4 to 256",
             refused(|d| {
                 d["parts"][0]["solids"][0]["shape"] =
-                    json!({"type": "convex", "vertices": [[0, 0, 0], [1, 0, 0], [0, 1, 0]], "faces": [[0, 1, 2]]})
+                    json!({"type": "convex", "vertices": [[0, 0, 0], [1, 0, 0], [0, 1, 0]], "faces": [[0, 1, 2]]});
             }),
         ),
         ("unknown field `wings`", refused(|d| d["parts"][0]["wings"] = json!(2))),

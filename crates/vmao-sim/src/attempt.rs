@@ -3,7 +3,7 @@
 use crate::assignment::assignments;
 use crate::cameras::observe;
 use crate::combinations::{Choices, Reserve, compatible_grasps, free_alone, joint_positions_with};
-use crate::dependency_root::{choose, grasp_sequence, step_goal};
+use crate::dependency_root::{choose_root, grasp_sequence, step_goal};
 use crate::failure::Failure;
 use crate::grasping::{Grasp, GraspConfig, object_cloud, reachable_grasps};
 use crate::measures::Measuring;
@@ -109,7 +109,7 @@ impl<'a> Attempt<'a> {
         let start = simulation.object_state();
         // Drawn as a motion of part 0 whatever the root, so that all roots meet the same goals.
         let (drawn, goal_parts, reach) = draw_goal(scene, (&config.goal, &config.grasp), &start, &mut draw(Draw::Goal));
-        let root = choose(scene, &config.motion, order, &start, &drawn);
+        let root = choose_root(scene, config, order, &start, &drawn);
         let goal = drawn.with_root(&scene.object, &graph, root);
         let sequence = grasp_sequence(&graph, goal.root, order);
         if recording == Recording::On {

@@ -3,9 +3,11 @@
 use crate::error::Error;
 use crate::execution::MotionConfig;
 use crate::scene::Scene;
+use crate::trial::TrialConfig;
+use nalgebra::{Point3, Vector3};
 use vmao_core::contact::PartId;
 use vmao_core::geometry::Pose;
-use vmao_core::object::{ArticulatedObject, ObjectGoal, ObjectState};
+use vmao_core::object::{ArticulatedObject, ObjectGoal, ObjectState, Part};
 use vmao_core::object_centric::{ObjectTrajectory, part_poses};
 use vmao_core::object_graph::ObjectGraph;
 use vmao_core::order::GraspOrder;
@@ -76,10 +78,11 @@ pub struct PredictedMotion {
     pub swing: f64,
     /// Largest speed of a gripper (m/s).
     pub hand_speed: f64,
-    /// Largest horizontal distance from the table's centre at which a part waits for its gripper (m).
-    pub waiting_distance: f64,
+    /// Largest moment of the object's weight about the middle of the places held, while not all are (N·m).
+    pub moment: f64,
 }
 
+const GRAVITY: f64 = 9.81; // m/s²
 /// Steps into which a motion is cut to predict it.
 const PREDICTED_STEPS: usize = 12;
 
@@ -99,10 +102,6 @@ pub fn predict(
     let (mut now, mut ways) = (start.clone(), vec![0.0; sequence.len()]);
     let mut predicted = PredictedMotion::default();
     for step in order.steps(sequence.len()) {
-        for part in &sequence[step.start..] {
-            let place = places(&now.world_from_parts)[usize::from(part.0)];
-            predicted.waiting_distance = predicted.waiting_distance.max(place.coords.xy().norm());
-        }
         let held = &sequence[..step.end];
         let to = step_goal(object, (goal, &goal_parts), held, &now);
         let parts = part_poses(object, graph, to.root, &to.world_from_root, &to.joint_positions);
@@ -110,7 +109,11 @@ pub fn predict(
         let trajectory = ObjectTrajectory::new(object, graph, now, to.clone(), duration);
         let mut before = places(&trajectory.part_poses_at(0.0));
         for i in 1..=PREDICTED_STEPS {
-            let after = places(&trajectory.part_poses_at(duration * i as f64 / PREDICTED_STEPS as f64));
+            let poses = trajectory.part_poses_at(duration * i as f64 / PREDICTED_STEPS as f64);
+            let after = places(&poses);
+            if held.len() < sequence.len() {
+                predicted.moment = predicted.moment.max(weight_moment(scene, &poses, held, &after));
+            }
             for (part, (before, after)) in before.iter().zip(&after).enumerate() {
                 let length = (after - before).norm();
                 predicted.swing += length;
@@ -128,20 +131,39 @@ pub fn predict(
     predicted
 }
 
-/// Another root than the first must be better by this share.
-const CLEARLY_BETTER: f64 = 0.02;
+/// The moment of the object's weight about the middle of the places at which these parts are held (N·m).
+fn weight_moment(scene: &Scene, world_from_parts: &[Pose], held: &[PartId], places: &[Point3<f64>]) -> f64 {
+    let support = held.iter().map(|part| places[usize::from(part.0)].coords).sum::<Vector3<f64>>() / held.len() as f64;
+    let lever = |((part, pose), center): ((&Part, &Pose), &Point3<f64>)| (pose * center - Point3::from(support)) * part.mass;
+    let parts = scene.object.parts.iter().zip(world_from_parts).zip(&scene.mass_centers);
+    GRAVITY * parts.map(lever).sum::<Vector3<f64>>().xy().norm()
+}
 
-/// The root of a trial: the scene's, or of all parts the one of least [`PredictedMotion::hand_path`].
-pub(crate) fn choose(scene: &Scene, motion: &MotionConfig, order: GraspOrder, start: &ObjectState, goal: &ObjectGoal) -> PartId {
-    let root = match scene.root {
-        Root::Part(part) => return part,
-        Root::Auto => PartId(0),
-    };
-    let cost = |root: PartId| {
+/// Another root than the first must have ways that are shorter by this share.
+const CLEARLY_SHORTER: f64 = 0.02;
+/// The moment that grippers are trusted to hold, per force of a pad (m): between what held and what slipped in
+/// `docs/dependency-root.md`, 0.42 and 0.52 N·m at 17.5 N.
+const MOMENT_PER_FORCE: f64 = 0.026;
+
+/// The root of a trial: the scene's; for [`Root::Auto`] the shortest [`PredictedMotion::hand_path`] of all that can be held.
+///
+/// A root whose moment is more than the pads hold is taken only if all are, and then the one of least moment.
+pub fn choose_root(scene: &Scene, config: &TrialConfig, order: GraspOrder, start: &ObjectState, goal: &ObjectGoal) -> PartId {
+    if let Root::Part(part) = scene.root {
+        return part;
+    }
+    let motion = |part: usize| {
+        let root = PartId(part as u16);
         let goal = goal.with_root(&scene.object, &scene.graph, root);
-        predict(scene, motion, order, start, &goal).hand_path
+        (root, predict(scene, &config.motion, order, start, &goal))
     };
-    let first = (cost(root) * (1.0 - CLEARLY_BETTER), root);
-    let others = (1..scene.object.parts.len()).map(|part| PartId(part as u16)).map(|part| (cost(part), part));
-    others.fold(first, |best, other| if other.0 < best.0 { other } else { best }).1
+    let motions: Vec<(PartId, PredictedMotion)> = (0..scene.object.parts.len()).map(motion).collect();
+    let least = motions.iter().map(|(_, motion)| motion.moment).fold(f64::INFINITY, f64::min);
+    let trusted = least.max(MOMENT_PER_FORCE * config.grasp.closing_force);
+    let cost = |(root, motion): &(PartId, PredictedMotion)| {
+        let shorter = if root.0 == 0 { 1.0 - CLEARLY_SHORTER } else { 1.0 };
+        (motion.hand_path * shorter, *root)
+    };
+    let held = motions.iter().filter(|(_, motion)| motion.moment <= trusted).map(cost);
+    held.reduce(|best, other| if other.0 < best.0 { other } else { best }).map_or(PartId(0), |(_, root)| root)
 }

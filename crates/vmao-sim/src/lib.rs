@@ -41,7 +41,7 @@ mod trial;
 mod viewpoints;
 
 pub use cameras::CameraConfig;
-pub use dependency_root::{PredictedMotion, Root, predict};
+pub use dependency_root::{PredictedMotion, Root, choose_root, predict};
 pub use error::Error;
 pub use execution::MotionConfig;
 pub use exploration::{LabelSet, Proposals, explore_round, scene_of_trial};

@@ -120,6 +120,8 @@ pub struct Scene {
     pub(crate) model: Arc<MjModel>,
     pub(crate) arms: Vec<ArmIndex>,
     pub(crate) part_bodies: Vec<usize>,
+    /// Centre of mass of each part, part frame (m).
+    pub(crate) mass_centers: Vec<Point3<f64>>,
     pub(crate) object_qpos: usize,
     pub(crate) object_dof: usize,
     /// (qpos address, dof address) of each object joint; none for fixed joints.
@@ -190,6 +192,7 @@ impl Scene {
             .iter()
             .map(|part| id(&model, MjtObjBase::mjOBJ_BODY, &mjcf::part_name(&part.name)))
             .collect::<Result<Vec<_>, _>>()?;
+        let mass_centers = part_bodies.iter().map(|&body| model.body_ipos()[body].into()).collect();
         let (object_qpos, object_dof) = addresses(&model, "object")?;
         let joint_addresses = object
             .joints
@@ -214,6 +217,7 @@ impl Scene {
             model: Arc::new(model),
             arms,
             part_bodies,
+            mass_centers,
             object_qpos,
             object_dof,
             joint_addresses,

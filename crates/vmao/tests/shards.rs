@@ -68,7 +68,7 @@ fn a_merge_says_whose_trials_are_missing_damaged_or_different() {
         &["missing: trials 3 to 3 of shard 1/2; `vmao explore --shard I/N --resume`"],
     );
     fs::write(&last, &bytes[..bytes.len() / 2]).unwrap();
-    let torn = ["trials-00000003-00000003.parquet: damaged", "`vmao explore --shard 0/2 --resume` repairs it"];
+    let torn = ["trials-00000003-00000003.parquet: not a Parquet file", "`vmao explore --shard 0/2 --resume` repairs it"];
     check_failure(&merge(&at("shared"), &at("merged")), 2, &torn);
     let repaired = shard("0/2", &["--resume"]);
     assert!(explorations::words(&repaired).contains("repair: trials 3 to 3 run again"), "{}", explorations::words(&repaired));

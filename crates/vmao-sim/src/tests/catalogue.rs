@@ -2,7 +2,7 @@
 
 use super::settled;
 use super::support::configuration;
-use crate::scene::{Owner, Scene};
+use crate::scene::{Owner, Scene, SceneConfig};
 use crate::simulation::Simulation;
 use vmao_core::catalogue::{INSTANCES, InstanceSet, NAMES, item};
 use vmao_core::contact::PartId;
@@ -10,7 +10,9 @@ use vmao_core::object_centric::part_poses;
 
 /// The object alone on the table.
 fn alone(name: &str, set: InstanceSet, instance: u16) -> Scene {
-    Scene::without_arms(&configuration().0, item(name, set, instance).unwrap()).unwrap()
+    // Awake, so that its contacts are there to be looked at and a drift would show.
+    let config = SceneConfig { sleep_tolerance: 0.0, ..configuration().0 };
+    Scene::without_arms(&config, item(name, set, instance).unwrap()).unwrap()
 }
 
 /// Everything that lies deeper than a millimetre in something else.

@@ -2,7 +2,7 @@
 
 use super::object_trees::random_tree;
 use super::support::{SEED, configuration, demonstrated_trial, with_tiny_cameras};
-use crate::dependency_root::{Root, choose, grasp_sequence, predict, step_goal};
+use crate::dependency_root::{Root, choose_root, grasp_sequence, predict, step_goal};
 use crate::layout::Layout;
 use crate::scene::{Scene, SceneConfig};
 use crate::trial::{Recording, run_trial};
@@ -131,7 +131,7 @@ fn auto_is_the_trial_of_the_root_it_chose() {
         );
         let (start, goal) = (nothing.record.start, nothing.record.goal);
         assert_eq!(
-            choose(&auto, &config.motion, GraspOrder::Sequential, &start, &goal.with_root(&auto.object, &auto.graph, PartId(0))),
+            choose_root(&auto, &config, GraspOrder::Sequential, &start, &goal.with_root(&auto.object, &auto.graph, PartId(0))),
             goal.root
         );
         chosen[usize::from(goal.root.0)] += 1;
@@ -162,6 +162,19 @@ fn predicted_ways_are_those_of_plain_motions() {
         let in_turn = predict(&scene, &motion, GraspOrder::Sequential, &start, &goal);
         assert!((in_turn.hand_path - 0.24).abs() < 1e-9 && (in_turn.swing - 0.72).abs() < 1e-9, "{in_turn:?}");
     }
+    let moment = |root: usize| {
+        let goal = ObjectGoal {
+            root: PartId(root as u16),
+            world_from_root: Pose::translation(0.0, 0.0, 0.24) * parts[root],
+            joint_positions: joints.clone(),
+        };
+        assert!(predict(&scene, &motion, GraspOrder::Parallel, &start, &goal).moment == 0.0, "all is held");
+        predict(&scene, &motion, GraspOrder::Sequential, &start, &goal).moment
+    };
+    let weight = 9.81 * object.parts.iter().map(|part| part.mass).sum::<f64>();
+    assert!(moment(1) < 0.7 * moment(0), "a chain is lighter by its middle: {} and {} N·m", moment(1), moment(0));
+    // Nearly straight: half the middle stick, and three quarters of the end stick.
+    assert!((0.15..0.17).contains(&(moment(0) / weight)), "held by its end, {} m from its middle", moment(0) / weight);
     // A hinge that turns by half a turn about the standing root takes its hand along a half circle.
     let still = Pose::translation(0.0, 0.0, 0.02);
     let turned = ObjectGoal { root: PartId(0), world_from_root: still, joint_positions: vec![0.0, 1.0] };
@@ -177,4 +190,20 @@ fn predicted_ways_are_those_of_plain_motions() {
     let arcs: f64 = places(2.0).iter().map(|place| 2.0 * (place - hinge).norm()).sum();
     let predicted = predict(&scene, &motion, GraspOrder::Parallel, &before, &turned);
     assert!((predicted.hand_path / arcs - 1.0).abs() < 0.02, "{predicted:?}, arcs of {arcs} m");
+}
+
+#[test]
+fn auto_takes_no_root_that_cannot_carry_the_others() {
+    let (physics, config) = configuration();
+    let item = item("cabinet", InstanceSet::Train, 0).unwrap();
+    let scene = Scene::new(&SceneConfig { layout: Layout::Ring, ..physics }, vec![panda(); 3], item).unwrap();
+    let scene = scene.with_root("auto").unwrap();
+    let mut chosen = [0; 3];
+    for index in 0..40 {
+        let trial =
+            |order| run_trial(&scene, &with_tiny_cameras(&config), &FixedTuple(vec![]), order, (SEED, index), Recording::Off);
+        chosen[usize::from(trial(GraspOrder::Sequential).record.goal.root.0)] += 1;
+    }
+    let [body, door, drawer] = chosen;
+    assert!(door == 0 && body > 0 && drawer > 0, "{chosen:?}");
 }

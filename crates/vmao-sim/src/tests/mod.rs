@@ -5,6 +5,7 @@ mod catalogue;
 mod control;
 mod dependency_root;
 mod hulls;
+mod imported;
 mod internal_forces;
 mod inverse_kinematics;
 mod kinematics;

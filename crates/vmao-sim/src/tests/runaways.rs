@@ -33,7 +33,8 @@ fn a_trial_that_may_not_even_settle_fails_before_it_looks() {
 fn a_simulator_that_has_gone_astray_is_believed_no_more() {
     let scene = scene(0);
     let far = 1e11;
-    let spoils: [(&str, fn(&mut Simulation<'_>, f64)); 4] = [
+    type Spoil = fn(&mut Simulation<'_>, f64);
+    let spoils: [(&str, Spoil); 4] = [
         ("a position", |simulation, far| simulation.data.qpos_mut()[3] = far),
         ("a position", |simulation, _| simulation.data.qpos_mut()[3] = f64::NAN),
         ("a velocity", |simulation, far| simulation.data.qvel_mut()[8] = far),

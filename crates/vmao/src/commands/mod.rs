@@ -9,6 +9,7 @@ mod evaluate;
 mod explore;
 mod ik;
 mod object;
+mod object_import;
 mod ocao;
 mod plan;
 mod report;

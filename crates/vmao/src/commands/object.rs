@@ -1,6 +1,9 @@
 //! `vmao object list` and `vmao object show NAME`: the catalogue, and objects from files.
 
-use super::{CommonOptions, Session};
+use super::{
+    CommonOptions, Session,
+    object_import::{self, ImportArguments},
+};
 use crate::{
     failure::{Failure, OrBadInput},
     inputs::{is_path, read_object},
@@ -33,6 +36,11 @@ pub(super) enum Action {
         #[command(flatten)]
         common: CommonOptions,
     },
+    /// A PartNet-Mobility folder, a URDF or an MJCF file becomes an object that can be simulated
+    ///
+    /// Writes object.json, repairs.json and the pictures' meshes to --out, which must not be there yet.
+    /// docs/import.md says what is read, repaired and refused.
+    Import(Box<ImportArguments>),
     /// Parts, joints, limits, masses and dependency graph of one object
     Show {
         /// Its name, or the path of its file or folder (with a `/`)
@@ -45,6 +53,7 @@ pub(super) enum Action {
 impl Action {
     pub(super) fn common(&self) -> &CommonOptions {
         match self {
+            Self::Import(arguments) => &arguments.common,
             Self::List { common, .. } | Self::Show { common, .. } => common,
         }
     }
@@ -52,6 +61,7 @@ impl Action {
 
 pub(super) fn run(arguments: &ObjectArguments, session: &Session) -> Result<(), Failure> {
     match &arguments.action {
+        Action::Import(arguments) => object_import::run(arguments, session),
         Action::List { folder: None, .. } => session.print(&catalogue::NAMES),
         Action::List { folder: Some(folder), .. } => session.print(&files(folder)?),
         Action::Show { name, .. } => session.print(&description(name)?),
