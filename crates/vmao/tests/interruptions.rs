@@ -112,7 +112,8 @@ fn torn_flipped_and_lost_files_are_named_and_made_again() {
     let path = |index: usize| out.join(format!("trials-{index:08}-{index:08}.parquet"));
     let bytes = fs::read(path(1)).unwrap();
     let mut flipped = bytes.clone();
-    flipped[bytes.len() / 3] ^= 0x10;
+    // The first column with its page's head. A flip in a page's statistics goes unnoticed, as no record depends on it.
+    flipped[4..][..64].iter_mut().for_each(|byte| *byte ^= 0x10);
     let halves = [Vec::new(), bytes[..4].to_vec(), bytes[..bytes.len() / 2].to_vec(), bytes[..bytes.len() - 1].to_vec(), flipped];
     for damaged in halves {
         // The second of four, so that others follow that were drawn from its successes; and the last is lost altogether.

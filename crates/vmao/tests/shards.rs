@@ -4,6 +4,7 @@
 mod explorations;
 
 use explorations::{answer, check_failure, explore, rounds, vmao};
+use serde_json::Value;
 use std::{
     fs,
     path::Path,
@@ -13,6 +14,12 @@ use std::{
 fn merge(from: &Path, out: &Path) -> Output {
     let mut command: Command = vmao(&["dataset", "merge", "--json", "--out"]);
     command.arg(out).arg(from).output().unwrap()
+}
+
+/// What a merge knows of an exploration's answer: of how it came about, it says nothing.
+fn counts(whole: &Value) -> Value {
+    let kept = ["trials", "successes", "rate", "digest"].map(|key| (key.to_owned(), whole[key].clone()));
+    Value::Object(kept.into_iter().collect())
 }
 
 #[test]
@@ -36,10 +43,10 @@ fn shards_of_which_one_never_starts_merge_into_the_single_run() {
     for child in running {
         assert_eq!(answer(&child.wait_with_output().unwrap()), whole, "every shard knows the whole");
     }
-    assert_eq!(answer(&merge(&at("shared"), &at("merged"))), whole);
+    assert_eq!(answer(&merge(&at("shared"), &at("merged"))), counts(&whole));
     assert_eq!(rounds(&at("merged")), rounds(&at("whole")));
     // Once more into the same place changes nothing.
-    assert_eq!(answer(&merge(&at("shared"), &at("merged"))), whole);
+    assert_eq!(answer(&merge(&at("shared"), &at("merged"))), counts(&whole));
 
     // The shard that comes late finds all its trials run by others, and runs none.
     assert_eq!(answer(&shard("1/3").output().unwrap()), whole);
@@ -74,7 +81,7 @@ fn a_merge_says_whose_trials_are_missing_damaged_or_different() {
     assert!(explorations::words(&repaired).contains("repair: trials 3 to 3 run again"), "{}", explorations::words(&repaired));
     assert_eq!(answer(&repaired), whole);
     assert_eq!(fs::read(&last).unwrap(), bytes);
-    assert_eq!(answer(&merge(&at("shared"), &at("merged"))), whole);
+    assert_eq!(answer(&merge(&at("shared"), &at("merged"))), counts(&whole));
 
     // A shard of another run in the same place.
     check_failure(
