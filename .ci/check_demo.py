@@ -27,7 +27,7 @@ def check_results(run):
     check(results["config_sha256"] == sha, f"results.json: config_sha256 is not that of config.toml, {sha}")
     cells = results["cells"]
     names = sorted((cell["order"], cell["method"]) for cell in cells)
-    expected = sorted((order, method) for order in ("sequential", "parallel") for method in ("vmao", "top1"))
+    expected = sorted((order, method) for order in ("sequential", "parallel") for method in ("vmao", "best-of-k", "top1"))
     check(names == expected, f"results.json: cells {names}, expected {expected}")
     for cell in cells:
         name = f"results.json: {cell['method']}, {cell['order']}"

@@ -30,7 +30,7 @@ export function sentences(text) {
 /** Seconds with two digits. */
 export const seconds = (value) => `${value.toFixed(2)}\u2009s`;
 
-const METHODS = { vmao: "V-MAO", top1: "Top-1", uniform: "Uniform", demonstrations: "Demonstrations" };
+const METHODS = { vmao: "V-MAO", "best-of-k": "V-MAO best-of-K", top1: "Top-1", uniform: "Uniform", demonstrations: "Demonstrations" };
 const ORDERS = { parallel: "Parallel", "sequential-parallel": "Sequential-parallel", sequential: "Sequential" };
 const ROBOTS = { panda: "Panda", sawyer: "Sawyer" };
 

@@ -3,7 +3,7 @@
 export const FINGERS = ["#17924a", "#2563d9"];
 export const GOAL = "#2f9e5b";
 
-const METHOD_COLORS = { vmao: "#2c4a6e", top1: "#b9792b" };
+const METHOD_COLORS = { vmao: "#2c4a6e", "best-of-k": "#5b8a72", top1: "#b9792b" };
 const SPARE = ["#6b5b95", "#5a7d5a", "#8c4a4a", "#4d7f86"];
 
 /** A method's colour; unknown methods take the spare ones in turn. */
