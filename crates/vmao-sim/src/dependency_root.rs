@@ -141,8 +141,8 @@ fn weight_moment(scene: &Scene, world_from_parts: &[Pose], held: &[PartId], plac
 
 /// Another root than the first must have ways that are shorter by this share.
 const CLEARLY_SHORTER: f64 = 0.02;
-/// The moment that grippers are trusted to hold, per force of a pad (m): between what held and what slipped in
-/// `docs/dependency-root.md`, 0.42 and 0.52 N·m at 17.5 N.
+/// The moment that grippers are trusted to hold, per force of a pad (m): between what mostly held and what slipped in
+/// `docs/dependency-root.md`, 0.42 (a few slips) and 0.52 N·m (nearly all) at 17.5 N.
 const MOMENT_PER_FORCE: f64 = 0.026;
 
 /// The root of a trial: the scene's; for [`Root::Auto`] the shortest [`PredictedMotion::hand_path`] of all that can be held.
