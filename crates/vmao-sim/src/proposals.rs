@@ -6,7 +6,7 @@ use crate::grasping::{Grasp, object_cloud};
 use crate::profile::{Stage, time};
 use vmao_core::contact_model::FingerPoints;
 
-/// Combinations of proposals that are tried after the best one failed: more cost time and hardly ever helped.
+/// Combinations of proposals that are tried after the best one failed; each costs a search for grasps and a plan.
 const TRIED: usize = 8;
 
 impl Attempt<'_> {

@@ -62,12 +62,13 @@ pub(super) fn run(arguments: &SampleArguments, session: &Session) -> Result<(), 
     let evaluation = Evaluation::new(&session.config, session.info.seed, vec![(method, model)])?;
     let order = session.config.trial.order;
     let (mut written, mut figures) = (Vec::new(), Vec::new());
+    let pool = session.pool()?;
     let most = MOST_TRIALS_FOR_A_SCENE * arguments.scenes;
     for index in 0..most {
         if figures.len() as u64 == arguments.scenes {
             break;
         }
-        let Some(seen) = session.pool()?.install(|| look(&evaluation, method, order, index, grasp)) else { continue };
+        let Some(seen) = pool.install(|| look(&evaluation, method, order, index, grasp)) else { continue };
         let model = evaluation.model(method).context("the model is in the table")?;
         let part = usize::from(seen.contact.part.0);
         let codes = if model.networks[part].latent_size() == 0 { 1 } else { arguments.samples };
