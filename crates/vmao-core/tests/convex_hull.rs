@@ -1,6 +1,8 @@
 //! Convex hulls: what is refused, and measures and distances of boxes written as hulls against the boxes' own.
 #![expect(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
+mod way_out;
+
 use nalgebra::{Matrix3, Point3, Vector3};
 use proptest::prelude::*;
 use vmao_core::{
@@ -10,6 +12,7 @@ use vmao_core::{
     random::Stream,
     shape::Shape,
 };
+use way_out::best_way_out;
 
 /// A box as eight vertices and twelve triangles, its middle at `middle`.
 fn block(half: [f64; 3], middle: [f64; 3]) -> (Vec<Point3<f64>>, Vec<[u32; 3]>) {
@@ -216,14 +219,7 @@ proptest! {
         let first = Convex::new(&a, &Pose::identity());
         let depth = -first.signed_distance(&Convex::new(&b, &at));
         prop_assume!(depth > 1e-4);
-        let mut stream = Stream::new(seeds[0], &[seeds[1]]);
-        let moved = |by: Vector3<f64>| first.signed_distance(&Convex::new(&b, &(Pose::from_parts(by.into(), Default::default()) * at)));
-        let mut freed = f64::NEG_INFINITY;
-        for _ in 0..200 {
-            let way = Vector3::new(stream.normal(), stream.normal(), stream.normal()).normalize();
-            prop_assert!(moved(way * depth * 0.999) < 0.0, "no shorter way out, but {way:?}");
-            freed = freed.max(moved(way * depth * 1.05));
-        }
+        let freed = best_way_out(&first, (&b, &at), depth, 200, &mut Stream::new(seeds[0], &[seeds[1]]));
         prop_assert!(freed > -0.1 * depth, "some way of about that length leads out, best {freed} of {depth}");
     }
 }

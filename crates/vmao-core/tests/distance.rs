@@ -3,6 +3,7 @@
 #![expect(clippy::needless_pass_by_value, reason = "tests build what they compare in the call")]
 
 mod slow;
+mod way_out;
 
 use nalgebra::{Point3, Vector3};
 use proptest::prelude::*;
@@ -14,6 +15,7 @@ use vmao_core::{
     random::Stream,
     shape::Shape,
 };
+use way_out::best_way_out;
 
 const BALL: Shape = Shape::Sphere { radius: 0.1 };
 const ROD: Shape = Shape::Capsule { radius: 0.1, half_length: 0.5 };
@@ -141,14 +143,7 @@ proptest! {
     fn the_depth_is_the_shortest_way_out(a in (shapes(), poses(0.2)), b in (shapes(), poses(0.2))) {
         let depth = -distance(a.clone(), b.clone());
         prop_assume!(depth > 1e-3);
-        let (first, mut stream) = (Convex::new(&a.0, &a.1), Stream::new(depth.to_bits(), &[]));
-        let moved = |by: Vector3<f64>| first.signed_distance(&Convex::new(&b.0, &(Pose::from_parts(by.into(), Default::default()) * b.1)));
-        let mut freed = f64::NEG_INFINITY;
-        for _ in 0..300 {
-            let way = Vector3::new(stream.normal(), stream.normal(), stream.normal()).normalize();
-            prop_assert!(moved(way * depth * 0.999) < 0.0, "no shorter way out, but {way:?}");
-            freed = freed.max(moved(way * depth * 1.05));
-        }
+        let freed = best_way_out(&Convex::new(&a.0, &a.1), (&b.0, &b.1), depth, 300, &mut Stream::new(depth.to_bits(), &[]));
         prop_assert!(freed > -0.05 * depth, "some way of about that length leads out, best {freed} of {depth}");
     }
 
