@@ -33,4 +33,5 @@ pub mod run_report;
 pub mod scenes;
 pub mod sharing;
 pub mod statistics;
+pub mod training_device;
 pub use vmao_core::wording;

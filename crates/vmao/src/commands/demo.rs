@@ -10,6 +10,7 @@ use crate::{
     output::{Layout, log, print},
     run_report::write_report,
     scenes::grasps,
+    training_device::DeviceOptions,
 };
 use serde::Serialize;
 use std::path::{Path, PathBuf};
@@ -17,6 +18,8 @@ use vmao_net::ModelKind;
 
 #[derive(Debug, clap::Args)]
 pub(super) struct DemoArguments {
+    #[command(flatten)]
+    device: DeviceOptions,
     #[command(flatten)]
     pub(super) common: CommonOptions,
 }
@@ -27,7 +30,7 @@ struct Answer {
     results: PathBuf,
 }
 
-pub(super) fn run(_arguments: &DemoArguments, mut session: Session) -> Result<(), Failure> {
+pub(super) fn run(arguments: &DemoArguments, mut session: Session) -> Result<(), Failure> {
     // The models are used in all the orders that are compared, so they must have seen all of them.
     session.configure(|config| {
         if config.explore.orders.is_empty() {
@@ -50,11 +53,12 @@ pub(super) fn run(_arguments: &DemoArguments, mut session: Session) -> Result<()
             data.display(),
             config_file.display()
         ));
+        let device = arguments.device.resolve();
         let mut models = Vec::new();
         for kind in ModelKind::ALL {
             if config.evaluate.methods.iter().any(|method| method.model() == kind) {
                 let place = directory.join("models").join(kind.name());
-                train_all(config, kind, &records, seed, &place)?;
+                train_all(config, kind, &records, seed, device, &place)?;
                 models.push(load(&place, grasps(config)?)?);
             }
         }
