@@ -39,7 +39,9 @@ impl Golden<'_> {
 }
 
 /// Reads a golden file, runs the objective on its inputs and weights, and compares inputs as read, values and all gradients.
-pub(crate) fn compare<O: Operations>(bytes: &[u8]) {
+///
+/// Returns the gradients.
+pub(crate) fn compare<O: Operations>(bytes: &[u8]) -> Vec<Option<Vec<f32>>> {
     let (_, header) = SafeTensors::read_metadata(bytes).unwrap();
     let notes = header.metadata().as_ref().unwrap();
     let config: NetworkConfig = serde_json::from_str(&notes["network"]).unwrap();
@@ -91,6 +93,7 @@ pub(crate) fn compare<O: Operations>(bytes: &[u8]) {
     }
     let minted = golden.0.names().iter().filter(|name| name.starts_with("gradient.")).count();
     assert_eq!(checked + 1, minted, "every array that PyTorch has a gradient of");
+    gradients
 }
 
 pub(crate) const EVERY_LEVEL: &[u8] = include_bytes!("../goldens/every_level.safetensors");
