@@ -1,6 +1,7 @@
 //! A trained network as bytes: weights in safetensors, everything else in JSON.
 
 use crate::config::{ModelKind, NetworkConfig};
+use crate::device::Device;
 use crate::error::Error;
 use crate::parameters::{Layout, Parameters, Spec, Start};
 use crate::training::Elbo;
@@ -14,6 +15,8 @@ pub struct Checkpoint {
     pub kind: ModelKind,
     /// The network.
     pub network: NetworkConfig,
+    /// What trained it.
+    pub device: Device,
     /// The epoch the weights are from, from one.
     pub epoch: usize,
     /// The validation terms of that epoch.
@@ -28,6 +31,9 @@ struct Description {
     format: u32,
     kind: ModelKind,
     network: NetworkConfig,
+    /// Documents from before there was a choice have none.
+    #[serde(default)]
+    device: Device,
     epoch: usize,
     validation: Option<Elbo>,
 }
@@ -58,6 +64,7 @@ impl Checkpoint {
             format: FORMAT,
             kind: self.kind,
             network: self.network.clone(),
+            device: self.device,
             epoch: self.epoch,
             validation: self.validation,
         };
@@ -77,8 +84,8 @@ impl Checkpoint {
             .map_err(|error| Error::NotSafetensors { bytes: bytes.len(), reason: error.to_string() })?;
         let (layout, _) = description.kind.layers(&description.network);
         let parameters = read(&layout, &file, description.kind)?;
-        let Description { kind, network, epoch, validation, .. } = description;
-        Ok(Self { kind, network, epoch, validation, parameters })
+        let Description { kind, network, device, epoch, validation, .. } = description;
+        Ok(Self { kind, network, device, epoch, validation, parameters })
     }
 }
 

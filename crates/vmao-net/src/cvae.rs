@@ -7,10 +7,12 @@ use crate::batch::Batch;
 use crate::cloud::FEATURES;
 use crate::config::{LatentPlacement, ModelKind, NetworkConfig};
 use crate::kernels::cross_entropy::FINGERS;
+use crate::kernels::edge::Edges;
 use crate::layers::{ModulatedHead, NormLinear, Pass, PlainLinear, SetAbstraction, SetUpConv};
+use crate::operations::{DeviceOf, Operations, Rows};
 use crate::parameters::Layout;
-use crate::tape::PointBackend;
 use burn::tensor::{Tensor, TensorData};
+use std::sync::Arc;
 
 /// Largest size of a log variance: beyond it the divergence overflows before it says anything.
 pub(crate) const LOG_VARIANCE_LIMIT: f32 = 10.0;
@@ -46,11 +48,11 @@ pub(crate) struct Posterior {
 
 /// The terms of the objective over one batch.
 #[derive(Debug)]
-pub(crate) struct Terms<B: PointBackend> {
+pub(crate) struct Terms<O: Operations> {
     /// Cross entropy, mean over clouds and fingers.
-    pub(crate) reconstruction: Tensor<B, 1>,
+    pub(crate) reconstruction: Tensor<O::Tape, 1>,
     /// KL divergence, mean over clouds; none without latent code.
-    pub(crate) kl: Option<Tensor<B, 1>>,
+    pub(crate) kl: Option<Tensor<O::Tape, 1>>,
 }
 
 impl Cvae {
@@ -95,75 +97,74 @@ impl Cvae {
     }
 
     /// Both terms of the objective; `noise` is clouds × Z standard normal numbers.
-    pub(crate) fn objective<B: PointBackend>(
+    pub(crate) fn objective<O: Operations>(
         &self,
-        pass: &mut Pass<B>,
+        pass: &mut Pass<O>,
         batch: &Batch,
         noise: Vec<f32>,
-        device: &B::Device,
-    ) -> Terms<B> {
+        device: &DeviceOf<O>,
+    ) -> Terms<O> {
         let constant = |values: Vec<f32>, columns: usize| {
             let rows = values.len() / columns;
-            Tensor::<B, 2>::from_data(TensorData::new(values, [rows, columns]), device)
+            Rows::<O>::from_data(TensorData::new(values, [rows, columns]), device)
         };
         let features = constant(batch.features.clone(), FEATURES);
-        let scene = encode(&self.scene, pass, &features, batch);
+        let edges = |edges: &Arc<Edges>| O::edges(edges, device);
+        let (down, up): (Vec<_>, Vec<_>) = (batch.down.iter().map(edges).collect(), batch.up.iter().map(edges).collect());
+        let owners: Vec<_> = batch.owners.iter().map(|picks| O::picks(picks, device)).collect();
+        let scene = encode(&self.scene, pass, &features, &down);
         let mut kl = None;
         let latent = self.posterior.as_ref().map(|posterior| {
             let (mean, log_variance) = {
                 let rows = constant(batch.posterior_features.clone(), FEATURES + FINGERS);
-                posterior.forward(pass, batch, &rows, constant(batch.map_means.clone(), MAP_MEANS))
+                posterior.forward(pass, batch.clouds, &down, &rows, constant(batch.map_means.clone(), MAP_MEANS))
             };
-            kl = Some(divergence(mean.clone(), log_variance.clone()).div_scalar(batch.clouds as f32));
+            kl = Some(divergence::<O>(mean.clone(), log_variance.clone()).div_scalar(batch.clouds as f32));
             mean + log_variance.mul_scalar(0.5).exp() * constant(noise, self.latent_size)
         });
         let levels = self.scene.len();
         let mut coarse = scene[levels - 1].clone();
-        let mut modulators = vec![self.context.forward(pass, pool_clouds(coarse.clone(), batch.clouds))];
+        let mut modulators = vec![self.context.forward(pass, pool_clouds::<O>(coarse.clone(), batch.clouds))];
         modulators.extend(latent.clone());
         if let Some(z) = &latent {
-            coarse = Tensor::cat(vec![coarse, B::gather(z.clone(), &batch.owners[levels])], 1);
+            coarse = Tensor::cat(vec![coarse, O::gather(z.clone(), &owners[levels])], 1);
         }
         for (i, layer) in self.decoder.iter().enumerate() {
             let fine = levels - 1 - i;
             let mut skip = vec![if fine == 0 { features.clone() } else { scene[fine - 1].clone() }];
             if let (Some(z), LatentPlacement::EveryLevel) = (&latent, self.placement) {
-                skip.push(B::gather(z.clone(), &batch.owners[fine]));
+                skip.push(O::gather(z.clone(), &owners[fine]));
             }
-            coarse = layer.forward(pass, coarse, skip, &batch.up[fine]);
+            coarse = layer.forward(pass, coarse, skip, &up[fine]);
         }
         let hidden = self.head.forward(pass, coarse, 1);
         let logits = self.logits.forward(pass, hidden, Tensor::cat(modulators, 1), &batch.starts);
-        Terms { reconstruction: B::cross_entropy(logits, &batch.targets, &batch.starts), kl }
+        Terms { reconstruction: O::cross_entropy(logits, &batch.targets, &batch.starts), kl }
     }
 }
 
 impl Posterior {
     /// Mean and log variance, clouds × Z; `means` clouds × 6.
-    fn forward<B: PointBackend>(
+    fn forward<O: Operations>(
         &self,
-        pass: &mut Pass<B>,
-        batch: &Batch,
-        features: &Tensor<B, 2>,
-        means: Tensor<B, 2>,
-    ) -> (Tensor<B, 2>, Tensor<B, 2>) {
-        let mut levels = encode(&self.encoder, pass, features, batch);
+        pass: &mut Pass<O>,
+        clouds: usize,
+        down: &[O::Edges],
+        features: &Rows<O>,
+        means: Rows<O>,
+    ) -> (Rows<O>, Rows<O>) {
+        let mut levels = encode(&self.encoder, pass, features, down);
         let top = levels.remove(levels.len() - 1);
-        let read = Tensor::cat(vec![pool_clouds(top, batch.clouds), means], 1);
+        let read = Tensor::cat(vec![pool_clouds::<O>(top, clouds), means], 1);
         let log_variance = self.log_variance.forward(pass, read.clone()).clamp(-LOG_VARIANCE_LIMIT, LOG_VARIANCE_LIMIT);
         (self.mean.forward(pass, read), log_variance)
     }
 }
 
 /// The features of every level, finest first, without the input.
-fn encode<B: PointBackend>(
-    layers: &[SetAbstraction],
-    pass: &mut Pass<B>,
-    features: &Tensor<B, 2>,
-    batch: &Batch,
-) -> Vec<Tensor<B, 2>> {
-    let mut out: Vec<Tensor<B, 2>> = Vec::with_capacity(layers.len());
-    for (layer, balls) in layers.iter().zip(&batch.down) {
+fn encode<O: Operations>(layers: &[SetAbstraction], pass: &mut Pass<O>, features: &Rows<O>, down: &[O::Edges]) -> Vec<Rows<O>> {
+    let mut out: Vec<Rows<O>> = Vec::with_capacity(layers.len());
+    for (layer, balls) in layers.iter().zip(down) {
         let finer = out.last().cloned().unwrap_or_else(|| features.clone());
         out.push(layer.forward(pass, finer, balls));
     }
@@ -171,14 +172,16 @@ fn encode<B: PointBackend>(
 }
 
 /// The largest of each feature over the coarsest points of each cloud.
-fn pool_clouds<B: PointBackend>(top: Tensor<B, 2>, clouds: usize) -> Tensor<B, 2> {
+fn pool_clouds<O: Operations>(top: Rows<O>, clouds: usize) -> Rows<O> {
     let [rows, _] = top.dims();
-    B::max_pool(top, rows / clouds)
+    O::max_pool(top, rows / clouds)
 }
 
 /// Σ over rows and columns of ½ (μ² + σ² − 1 − ln σ²): KL(N(μ, σ²) ‖ N(0, 1)) (Kingma & Welling 2014, appendix B).
-fn divergence<B: PointBackend>(mean: Tensor<B, 2>, log_variance: Tensor<B, 2>) -> Tensor<B, 1> {
-    (mean.powi_scalar(2) + log_variance.clone().exp() - log_variance - 1.0).sum().mul_scalar(0.5)
+fn divergence<O: Operations>(mean: Rows<O>, log_variance: Rows<O>) -> Tensor<O::Tape, 1> {
+    let terms = mean.powi_scalar(2) + log_variance.clone().exp() - log_variance - 1.0;
+    // Not `sum`: on a GPU burn adds that up in whatever order its threads come.
+    terms.sum_dim(1).sum_dim(0).reshape([1]).mul_scalar(0.5)
 }
 
 impl ModelKind {

@@ -52,6 +52,14 @@ pub enum Error {
         /// Batch of the epoch, from one; zero for the validation after it.
         batch: usize,
     },
+    /// The device that trains failed.
+    #[error("the {device} device failed: {reason}; train on the CPU, or with smaller batches if it ran out of memory")]
+    Device {
+        /// Its name.
+        device: String,
+        /// The first line of what it said.
+        reason: String,
+    },
     /// The bytes are not a safetensors file.
     #[error("not a readable safetensors file of {bytes} bytes: {reason}")]
     NotSafetensors {

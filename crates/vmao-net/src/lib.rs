@@ -13,17 +13,19 @@ mod checkpoint;
 mod cloud;
 mod config;
 mod cvae;
+mod device;
 mod error;
 mod kernels;
 mod layers;
 mod network;
+mod objective;
 #[cfg(test)]
 mod objective_checks;
+mod operations;
 mod parameters;
 mod pyramid;
 #[cfg(test)]
 mod pytorch_goldens;
-mod tape;
 mod training;
 
 pub use checkpoint::Checkpoint;
@@ -31,6 +33,7 @@ pub use cloud::Example;
 pub use config::{
     AbstractionConfig, AugmentationConfig, LatentPlacement, ModelKind, NetworkConfig, TrainingConfig, UpConvConfig,
 };
+pub use device::Device;
 pub use error::Error;
 pub use network::{ContactNetwork, EncodedScene};
 pub use training::{Elbo, EpochReport, train};

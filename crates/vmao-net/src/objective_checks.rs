@@ -3,6 +3,7 @@
 use crate::batch::{Batch, Prepared};
 use crate::cloud::Example;
 use crate::config::{AbstractionConfig, LatentPlacement, ModelKind, NetworkConfig, TrainingConfig, UpConvConfig};
+use crate::device::Device;
 use crate::kernels::cross_entropy::cross_entropy;
 use crate::kernels::finite_difference::{check, dot, normal};
 use crate::network::ContactNetwork;
@@ -56,7 +57,7 @@ fn gradients_of_the_whole_objective_match_finite_differences() {
     let (_, batch) = batch(&config, 3);
     let noise = normal(5, 9);
     for kind in [ModelKind::Vmao, ModelKind::Top1] {
-        let mut trainer = Trainer::new(kind, &config, &TrainingConfig::small(), 11);
+        let mut trainer = Trainer::new(kind, &config, &TrainingConfig::small(), 11, Device::Cpu);
         let noise = if kind == ModelKind::Vmao { noise.clone() } else { Vec::new() };
         // Maps that start flat hide errors: make the last weights large.
         for (values, spec) in trainer.parameters.values.iter_mut().zip(trainer.layout.specs()) {
@@ -64,7 +65,7 @@ fn gradients_of_the_whole_objective_match_finite_differences() {
                 values.iter_mut().for_each(|v| *v *= 10.0);
             }
         }
-        let (_, gradients, _) = trainer.gradients(&batch, noise.clone(), config.beta);
+        let gradients = trainer.objective(&batch, noise.clone(), config.beta).unwrap().gradients;
         let specs = trainer.layout.specs().to_vec();
         let mut checked = 0;
         for (i, spec) in specs.iter().enumerate() {
@@ -82,7 +83,7 @@ fn gradients_of_the_whole_objective_match_finite_differences() {
             let steps = [1e-3, 2e-4, 4e-5, 1e-5].map(|change| change / length.max(1e-3));
             check(&spec.name, &start, gradient, &steps, 0.05, |values| {
                 trainer.parameters.values[i] = values.to_vec();
-                let (terms, ..) = trainer.gradients(&batch, noise.clone(), config.beta);
+                let terms = trainer.objective(&batch, noise.clone(), config.beta).unwrap().terms;
                 trainer.parameters.values[i] = start.clone();
                 f64::from(terms.reconstruction) + f64::from(config.beta) * f64::from(terms.kl)
             });
@@ -96,10 +97,10 @@ fn gradients_of_the_whole_objective_match_finite_differences() {
 fn prediction_equals_training_when_the_statistics_are_the_batchs() {
     let config = tiny();
     let (prepared, batch) = batch(&config, 1);
-    let mut trainer = Trainer::new(ModelKind::Vmao, &config, &TrainingConfig::small(), 2);
+    let mut trainer = Trainer::new(ModelKind::Vmao, &config, &TrainingConfig::small(), 2, Device::Cpu);
     // The first step takes the batch's moments whole; with a step size of zero the weights stay.
     let noise = vec![0.0; 3];
-    let trained = trainer.step(&batch, noise, config.beta, 0.0).unwrap();
+    let trained = trainer.step(&batch, noise, config.beta, 0.0, (1, 1)).unwrap();
     let network = ContactNetwork::fold(&trainer.cvae, &config, &trainer.parameters);
     let scene = network.encode_prepared(&prepared[0]);
     let (mean, log_variance) = network.posterior(&scene, &prepared[0].maps).unwrap();
@@ -115,12 +116,12 @@ fn one_batch_is_learned_by_heart() {
     let config = NetworkConfig { beta: 1e-3, ..tiny() };
     let (prepared, batch) = batch(&config, 4);
     let entropy: f32 = prepared.iter().map(|p| p.maps.iter().filter(|&&m| m > 0.0).map(|m| -m * m.ln()).sum::<f32>() / 8.0).sum();
-    let mut trainer = Trainer::new(ModelKind::Vmao, &config, &TrainingConfig::small(), 2);
+    let mut trainer = Trainer::new(ModelKind::Vmao, &config, &TrainingConfig::small(), 2, Device::Cpu);
     let mut last = 0.0;
     let mut first = 0.0;
     for step in 0..300 {
         let noise = normal(step, 12);
-        last = trainer.step(&batch, noise, config.beta, 5e-3).unwrap().reconstruction - entropy;
+        last = trainer.step(&batch, noise, config.beta, 5e-3, (1, 1)).unwrap().reconstruction - entropy;
         if step == 0 {
             first = last;
         }

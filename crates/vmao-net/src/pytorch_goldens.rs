@@ -2,9 +2,10 @@
 
 use crate::batch::{Batch, Prepared};
 use crate::cloud::{Example, FEATURES, features};
-use crate::config::{ModelKind, NetworkConfig, TrainingConfig};
+use crate::config::{ModelKind, NetworkConfig};
 use crate::kernels::cross_entropy::FINGERS;
-use crate::training::Trainer;
+use crate::objective::{Objective, objective};
+use crate::operations::{Fused, Operations};
 use safetensors::SafeTensors;
 use vmao_core::random::Stream;
 
@@ -38,7 +39,7 @@ impl Golden<'_> {
 }
 
 /// Reads a golden file, runs the objective on its inputs and weights, and compares inputs as read, values and all gradients.
-fn compare(bytes: &[u8]) {
+pub(crate) fn compare<O: Operations>(bytes: &[u8]) {
     let (_, header) = SafeTensors::read_metadata(bytes).unwrap();
     let notes = header.metadata().as_ref().unwrap();
     let config: NetworkConfig = serde_json::from_str(&notes["network"]).unwrap();
@@ -64,19 +65,21 @@ fn compare(bytes: &[u8]) {
     let batch = Batch::new(&members, &config);
     assert_eq!(batch.features.len() / FEATURES, batch.targets.len() / FINGERS);
 
-    let mut trainer = Trainer::new(kind, &config, &TrainingConfig::small(), 0);
-    let specs = trainer.layout.specs().to_vec();
-    for (values, spec) in trainer.parameters.values.iter_mut().zip(&specs).filter(|(_, spec)| spec.is_trained()) {
+    let (layout, cvae) = kind.layers(&config);
+    let mut parameters = layout.start(0);
+    let specs = layout.specs();
+    for (values, spec) in parameters.values.iter_mut().zip(specs).filter(|(_, spec)| spec.is_trained()) {
         let minted = golden.floats(&format!("weight.{}", spec.name));
         assert_eq!(minted.len(), values.len(), "{}", spec.name);
         *values = minted;
     }
     let noise = if kind == ModelKind::Vmao { golden.floats("noise") } else { Vec::new() };
-    let (terms, gradients, _) = trainer.gradients(&batch, noise, config.beta);
+    let found = objective::<O>((&layout, &cvae), &parameters, &batch, noise, config.beta, &Default::default());
+    let Objective { terms, gradients, .. } = found;
     golden.assert_close("reconstruction", &[terms.reconstruction]);
     golden.assert_close("kl", &[terms.kl]);
     let mut checked = 0;
-    for (gradient, spec) in gradients.iter().zip(&specs).filter(|(_, spec)| spec.is_trained()) {
+    for (gradient, spec) in gradients.iter().zip(specs).filter(|(_, spec)| spec.is_trained()) {
         let gradient = gradient.as_ref().unwrap_or_else(|| panic!("{} has no gradient", spec.name));
         // The softmax over points does not see a shift common to them: this gradient is zero up to rounding on both sides.
         if spec.name == "decoder.logits.bias" {
@@ -90,17 +93,21 @@ fn compare(bytes: &[u8]) {
     assert_eq!(checked + 1, minted, "every array that PyTorch has a gradient of");
 }
 
+pub(crate) const EVERY_LEVEL: &[u8] = include_bytes!("../goldens/every_level.safetensors");
+pub(crate) const BOTTLENECK: &[u8] = include_bytes!("../goldens/bottleneck.safetensors");
+pub(crate) const TOP1: &[u8] = include_bytes!("../goldens/top1.safetensors");
+
 #[test]
 fn vmao_with_its_code_at_every_level_agrees_with_pytorch() {
-    compare(include_bytes!("../goldens/every_level.safetensors"));
+    compare::<Fused>(EVERY_LEVEL);
 }
 
 #[test]
 fn vmao_with_its_code_at_the_bottleneck_agrees_with_pytorch() {
-    compare(include_bytes!("../goldens/bottleneck.safetensors"));
+    compare::<Fused>(BOTTLENECK);
 }
 
 #[test]
 fn top1_agrees_with_pytorch() {
-    compare(include_bytes!("../goldens/top1.safetensors"));
+    compare::<Fused>(TOP1);
 }

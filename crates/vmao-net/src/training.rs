@@ -6,14 +6,12 @@ use crate::checkpoint::Checkpoint;
 use crate::cloud::{Example, check_cloud};
 use crate::config::{ModelKind, NetworkConfig, TrainingConfig};
 use crate::cvae::Cvae;
+use crate::device::Device;
 use crate::error::Error;
 use crate::kernels::cross_entropy::cross_entropy;
-use crate::layers::Pass;
 use crate::network::ContactNetwork;
+use crate::objective::Objective;
 use crate::parameters::{Layout, Parameters};
-use crate::tape::Cpu;
-use burn::backend::flex::FlexDevice;
-use burn::tensor::{Tensor, TensorData};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use std::ops::ControlFlow;
@@ -57,7 +55,7 @@ pub struct EpochReport {
     pub learning_rate: f32,
 }
 
-/// Trains a network from nothing. The weights of the best validation loss (or of the last epoch, without validation) are returned.
+/// Trains a network from nothing on `device`. The weights of the best validation loss (or of the last epoch, without validation) are returned.
 ///
 /// `on_epoch` sees every epoch and may end the training early with [`ControlFlow::Break`]. Fails on an invalid configuration or
 /// example, and as soon as a loss or a weight is not finite.
@@ -67,6 +65,7 @@ pub fn train(
     training: &TrainingConfig,
     examples: &[Example],
     seed: u64,
+    device: Device,
     on_epoch: &mut dyn FnMut(&EpochReport) -> ControlFlow<()>,
 ) -> Result<Checkpoint, Error> {
     network.validate()?;
@@ -80,7 +79,7 @@ pub fn train(
     let order = Stream::new(seed, &[LABEL_SPLIT]).permutation(examples.len());
     let held_out = (examples.len() as f32 * training.validation_fraction).round() as usize;
     let (validation, fitted) = order.split_at(held_out.min(examples.len() - 1));
-    let mut trainer = Trainer::new(kind, network, training, seed);
+    let mut trainer = Trainer::new(kind, network, training, seed, device);
     let mut best: Option<(f32, Checkpoint)> = None;
     for epoch in 1..=training.epochs {
         let (mean, beta, learning_rate) = trainer.epoch(epoch, &prepared, fitted)?;
@@ -128,6 +127,7 @@ pub(crate) struct Trainer {
     network: NetworkConfig,
     training: TrainingConfig,
     seed: u64,
+    device: Device,
     pub(crate) layout: Layout,
     pub(crate) cvae: Cvae,
     pub(crate) parameters: Parameters,
@@ -136,11 +136,22 @@ pub(crate) struct Trainer {
 }
 
 impl Trainer {
-    pub(crate) fn new(kind: ModelKind, network: &NetworkConfig, training: &TrainingConfig, seed: u64) -> Self {
+    pub(crate) fn new(kind: ModelKind, network: &NetworkConfig, training: &TrainingConfig, seed: u64, device: Device) -> Self {
         let (layout, cvae) = kind.layers(network);
         let parameters = layout.start(seed);
         let adam = Adam::new(layout.specs());
-        Self { kind, network: network.clone(), training: training.clone(), seed, layout, cvae, parameters, adam, steps: 0 }
+        Self {
+            kind,
+            network: network.clone(),
+            training: training.clone(),
+            seed,
+            device,
+            layout,
+            cvae,
+            parameters,
+            adam,
+            steps: 0,
+        }
     }
 
     /// One pass over `fitted`; returns the mean terms, β and the step size.
@@ -167,30 +178,32 @@ impl Trainer {
             let batch = Batch::new(&clouds, &self.network);
             let mut stream = Stream::new(self.seed, &[LABEL_NOISE, self.steps as u64]);
             let noise = (0..batch.clouds * self.cvae.latent_size()).map(|_| stream.normal() as f32).collect();
-            let terms = self.step(&batch, noise, beta, learning_rate).map_err(|(what, value)| Error::Diverged {
-                what,
-                value,
-                step: self.steps,
-                epoch,
-                batch: number + 1,
-            })?;
+            let terms = self.step(&batch, noise, beta, learning_rate, (epoch, number + 1))?;
             sum.reconstruction += terms.reconstruction / batches as f32;
             sum.kl += terms.kl / batches as f32;
         }
         Ok((sum, beta, learning_rate))
     }
 
-    /// One optimiser step; an error names what is not finite.
-    pub(crate) fn step(&mut self, batch: &Batch, noise: Vec<f32>, beta: f32, learning_rate: f32) -> Result<Elbo, (String, f32)> {
-        let (terms, gradients, moments) = self.gradients(batch, noise, beta);
+    /// One optimiser step; an error names what is not finite, and the epoch and batch of it.
+    pub(crate) fn step(
+        &mut self,
+        batch: &Batch,
+        noise: Vec<f32>,
+        beta: f32,
+        learning_rate: f32,
+        (epoch, number): (usize, usize),
+    ) -> Result<Elbo, Error> {
+        let Objective { terms, gradients, moments } = self.objective(batch, noise, beta)?;
+        let diverged = |what: String, value: f32| Error::Diverged { what, value, step: self.steps, epoch, batch: number };
         for (what, value) in [("reconstruction loss", terms.reconstruction), ("KL divergence", terms.kl)] {
             if !value.is_finite() {
-                return Err((what.to_owned(), value));
+                return Err(diverged(what.to_owned(), value));
             }
         }
         for (gradient, spec) in gradients.iter().zip(self.layout.specs()) {
             if let Some(&value) = gradient.iter().flatten().find(|g| !g.is_finite()) {
-                return Err((format!("gradient of `{}`", spec.name), value));
+                return Err(diverged(format!("gradient of `{}`", spec.name), value));
             }
         }
         self.adam.update(&mut self.parameters, &gradients, learning_rate);
@@ -206,27 +219,9 @@ impl Trainer {
         Ok(terms)
     }
 
-    /// The objective of a batch and its gradient by every trained array.
-    pub(crate) fn gradients(&self, batch: &Batch, noise: Vec<f32>, beta: f32) -> (Elbo, Vec<Option<Vec<f32>>>, Moments) {
-        let device = FlexDevice;
-        let weights = self.parameters.values.iter().zip(self.layout.specs()).map(|(values, spec)| {
-            let tensor = Tensor::<Cpu, 2>::from_data(TensorData::new(values.clone(), spec.shape), &device);
-            if spec.is_trained() { tensor.require_grad() } else { tensor }
-        });
-        let mut pass = Pass { weights: weights.collect(), moments: Vec::new() };
-        let terms = self.cvae.objective(&mut pass, batch, noise, &device);
-        let elbo = Elbo {
-            reconstruction: terms.reconstruction.clone().into_scalar(),
-            kl: terms.kl.clone().map_or(0.0, Tensor::into_scalar),
-        };
-        let loss = match terms.kl {
-            Some(kl) => terms.reconstruction + kl.mul_scalar(beta),
-            None => terms.reconstruction,
-        };
-        let tape = loss.backward();
-        let gradient = |tensor: &Tensor<Cpu, 2>| tensor.grad(&tape).and_then(|grad| grad.into_data().into_vec::<f32>().ok());
-        let gradients = pass.weights.iter().map(gradient).collect();
-        (elbo, gradients, pass.moments)
+    /// The objective of a batch and its gradients, on the device.
+    pub(crate) fn objective(&self, batch: &Batch, noise: Vec<f32>, beta: f32) -> Result<Objective, Error> {
+        self.device.objective((&self.layout, &self.cvae), &self.parameters, batch, noise, beta)
     }
 
     /// Mean terms over `members` as predicted, z drawn from the posterior with the same noise every epoch.
@@ -253,9 +248,7 @@ impl Trainer {
     }
 
     pub(crate) fn checkpoint(&self, epoch: usize, validation: Option<Elbo>) -> Checkpoint {
-        Checkpoint { kind: self.kind, network: self.network.clone(), epoch, validation, parameters: self.parameters.clone() }
+        let (network, device, parameters) = (self.network.clone(), self.device, self.parameters.clone());
+        Checkpoint { kind: self.kind, network, device, epoch, validation, parameters }
     }
 }
-
-/// Mean and variance arrays with the batch moments that move them.
-type Moments = Vec<(crate::parameters::ParameterId, crate::parameters::ParameterId, crate::kernels::norm::Moments)>;

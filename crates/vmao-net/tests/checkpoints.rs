@@ -8,14 +8,15 @@ use safetensors::tensor::TensorView;
 use safetensors::{Dtype, SafeTensors};
 use std::ops::ControlFlow;
 use std::sync::OnceLock;
-use vmao_net::{Checkpoint, ContactNetwork, Error, ModelKind, NetworkConfig, TrainingConfig, train};
+use vmao_net::{Checkpoint, ContactNetwork, Device, Error, ModelKind, NetworkConfig, TrainingConfig, train};
 
 fn checkpoint() -> &'static Checkpoint {
     static ONCE: OnceLock<Checkpoint> = OnceLock::new();
     ONCE.get_or_init(|| {
         let training = TrainingConfig { epochs: 1, ..TrainingConfig::small() };
         let examples = examples(&scenes(3, 10));
-        train(ModelKind::Vmao, &NetworkConfig::small(), &training, &examples, 2, &mut |_| ControlFlow::Continue(())).unwrap()
+        train(ModelKind::Vmao, &NetworkConfig::small(), &training, &examples, 2, Device::Cpu, &mut |_| ControlFlow::Continue(()))
+            .unwrap()
     })
 }
 

@@ -5,7 +5,7 @@ mod bar_world;
 
 use bar_world::{examples, scenes, score};
 use std::ops::ControlFlow;
-use vmao_net::{Checkpoint, ContactNetwork, EpochReport, ModelKind, NetworkConfig, TrainingConfig, train};
+use vmao_net::{Checkpoint, ContactNetwork, Device, EpochReport, ModelKind, NetworkConfig, TrainingConfig, train};
 
 /// Fewer points and scenes than the demo's, to be done in seconds.
 fn learned(kind: ModelKind, epochs: usize) -> (Checkpoint, Vec<EpochReport>) {
@@ -13,7 +13,7 @@ fn learned(kind: ModelKind, epochs: usize) -> (Checkpoint, Vec<EpochReport>) {
     network.points = 700;
     let training = TrainingConfig { epochs, ..TrainingConfig::small() };
     let mut reports = Vec::new();
-    let checkpoint = train(kind, &network, &training, &examples(&scenes(1, 150)), 0, &mut |report| {
+    let checkpoint = train(kind, &network, &training, &examples(&scenes(1, 150)), 0, Device::Cpu, &mut |report| {
         reports.push(*report);
         ControlFlow::Continue(())
     });

@@ -7,7 +7,7 @@ use bar_world::{examples, scenes};
 use std::ops::ControlFlow;
 use vmao_core::contact::ContactMap;
 use vmao_core::random::Stream;
-use vmao_net::{Checkpoint, ContactNetwork, Error, Example, ModelKind, NetworkConfig, TrainingConfig, train};
+use vmao_net::{Checkpoint, ContactNetwork, Device, Error, Example, ModelKind, NetworkConfig, TrainingConfig, train};
 
 fn quick() -> (NetworkConfig, TrainingConfig) {
     let mut network = NetworkConfig::small();
@@ -19,7 +19,7 @@ fn quick() -> (NetworkConfig, TrainingConfig) {
 
 fn trained(kind: ModelKind, seed: u64) -> Checkpoint {
     let (network, training) = quick();
-    train(kind, &network, &training, &examples(&scenes(3, 20)), seed, &mut |_| ControlFlow::Continue(())).unwrap()
+    train(kind, &network, &training, &examples(&scenes(3, 20)), seed, Device::Cpu, &mut |_| ControlFlow::Continue(())).unwrap()
 }
 
 fn in_pool<T: Send>(threads: usize, work: impl FnOnce() -> T + Send) -> T {
@@ -109,7 +109,7 @@ fn training_refuses_what_it_cannot_learn_from() {
     let (network, training) = quick();
     let good = examples(&scenes(3, 6));
     let run = |network: &NetworkConfig, training: &TrainingConfig, examples: &[Example]| {
-        train(ModelKind::Vmao, network, training, examples, 0, &mut |_| ControlFlow::Continue(())).unwrap_err()
+        train(ModelKind::Vmao, network, training, examples, 0, Device::Cpu, &mut |_| ControlFlow::Continue(())).unwrap_err()
     };
     assert_eq!(run(&network, &training, &good[..1]), Error::TooFewExamples { found: 1, needed: 2 });
     let mut bad = good.clone();
@@ -129,7 +129,16 @@ fn training_refuses_what_it_cannot_learn_from() {
 fn a_loss_that_is_no_number_names_step_and_batch() {
     let (network, mut training) = quick();
     training.learning_rate = 1e30;
-    let run = train(ModelKind::Vmao, &network, &training, &examples(&scenes(3, 20)), 0, &mut |_| ControlFlow::Continue(()));
+    let run =
+        train(
+            ModelKind::Vmao,
+            &network,
+            &training,
+            &examples(&scenes(3, 20)),
+            0,
+            Device::Cpu,
+            &mut |_| ControlFlow::Continue(()),
+        );
     let error = run.unwrap_err();
     assert!(matches!(error, Error::Diverged { step: 1.., epoch: 1, batch: 2.., .. }), "{error}");
 }
@@ -139,7 +148,7 @@ fn a_training_can_be_ended_early_and_reports_every_epoch() {
     let (network, mut training) = quick();
     training.epochs = 50;
     let mut epochs = Vec::new();
-    let checkpoint = train(ModelKind::Top1, &network, &training, &examples(&scenes(3, 10)), 0, &mut |report| {
+    let checkpoint = train(ModelKind::Top1, &network, &training, &examples(&scenes(3, 10)), 0, Device::Cpu, &mut |report| {
         epochs.push(report.epoch);
         assert!(report.epochs == 50 && report.training.kl == 0.0 && report.validation.is_some());
         if report.epoch == 3 { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }

@@ -13,7 +13,7 @@ use std::io::Write;
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 use vmao_core::record::TrialRecord;
-use vmao_net::{Checkpoint, ContactNetwork, EpochReport, Example, ModelKind, train};
+use vmao_net::{Checkpoint, ContactNetwork, Device, EpochReport, Example, ModelKind, train};
 
 /// Largest checkpoint file that is read (bytes).
 const MAX_CHECKPOINT_BYTES: u64 = 256 << 20;
@@ -55,12 +55,13 @@ pub fn examples(records: &[TrialRecord], part: usize) -> Vec<Example> {
         .collect()
 }
 
-/// Trains the networks of all grasp steps of `kind` into `directory`: `grasp-0/`, `grasp-1/`, … and `training.jsonl`.
+/// Trains the networks of all grasp steps of `kind` on `device` into `directory`: `grasp-0/`, `grasp-1/`, … and `training.jsonl`.
 pub fn train_all(
     config: &Config,
     kind: ModelKind,
     records: &[TrialRecord],
     seed: u64,
+    device: Device,
     directory: &Path,
 ) -> Result<Vec<EpochLine>, Failure> {
     let grasps = grasps(config)?;
@@ -77,7 +78,7 @@ pub fn train_all(
             ControlFlow::Continue(())
         };
         let seed = vmao_core::random::Stream::new(seed, &[TRAINING, grasp as u64]).bits();
-        let checkpoint = train(kind, &config.network, &config.train, &examples, u64::from(seed), &mut on_epoch)
+        let checkpoint = train(kind, &config.network, &config.train, &examples, u64::from(seed), device, &mut on_epoch)
             .with_context(|| format!("grasp {} of {}, {} successful examples", grasp + 1, kind.title(), examples.len()))?;
         save(&checkpoint, &grasp_directory(directory, grasp))?;
     }

@@ -36,4 +36,5 @@ pub mod scenes;
 pub mod sharing;
 pub mod significance;
 pub mod statistics;
+pub mod training_device;
 pub use vmao_core::wording;

@@ -133,9 +133,17 @@ fn an_arm_that_stands_by_needs_no_network() {
         let settings = ["--set", r#"object.name="sticks-1""#, "--set", "train.epochs=1", "--json"];
         let output = vmao(directory.path(), &[arguments, &settings].concat());
         assert!(output.status.success(), "{arguments:?}: {}", String::from_utf8_lossy(&output.stderr));
+        output
     };
     run(&["explore", "--successes", "2", "--max-trials", "8", "--out", "data"]);
-    run(&["train", "--data", "data", "--model", "top1", "--out", "top1"]);
+    let trained = run(&["train", "--data", "data", "--model", "top1", "--device", "cuda", "--out", "top1"]);
+    let said = String::from_utf8(trained.stderr).unwrap();
+    assert!(said.starts_with("training on the ") && said.lines().count() == 1, "one line says on what: {said}");
+    let name = if said.contains("on the first CUDA device") { "cuda" } else { "cpu" };
+    assert!(name == "cuda" || said.contains("as there is no CUDA device: "), "and why: {said}");
+    assert!(String::from_utf8(trained.stdout).unwrap().contains(&format!(r#""device":"{name}""#)));
+    let kept = fs::read_to_string(directory.path().join("top1/grasp-0/config.json")).unwrap();
+    assert!(kept.contains(&format!(r#""device": "{name}""#)), "{kept}");
     run(&["sample", "--checkpoint", "top1", "--scenes", "1", "--out", "maps"]);
     assert_eq!(fs::read_dir(directory.path().join("maps/maps")).unwrap().count(), 1, "Top-1 has one map");
     assert!(!directory.path().join("top1/grasp-1").exists(), "one part, one grasp");

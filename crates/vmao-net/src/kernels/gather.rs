@@ -37,6 +37,12 @@ impl Picks {
         self.starts.len() - 1
     }
 
+    /// The inverse lists: where each table row's own begins (and the end), and the picked rows that come from it.
+    #[cfg(any(test, feature = "cubecl"))]
+    pub(crate) fn inverse(&self) -> (&[u32], &[u32]) {
+        (&self.starts, &self.rows)
+    }
+
     /// The picked rows of `table`, one after the other.
     pub(crate) fn gather(&self, table: &[f32], channels: usize) -> Vec<f32> {
         assert_eq!(table.len(), self.table_rows() * channels, "a table of {} rows", self.table_rows());

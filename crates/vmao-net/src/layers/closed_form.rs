@@ -4,8 +4,8 @@ use super::{GroupedMlp, Pass, SetAbstraction, SetUpConv};
 use crate::config::{AbstractionConfig, UpConvConfig};
 use crate::kernels::edge::Edges;
 use crate::kernels::gather::Picks;
+use crate::operations::{Fused, Rows};
 use crate::parameters::{Layout, Parameters};
-use crate::tape::Cpu;
 use burn::tensor::{Tensor, TensorData};
 use std::sync::Arc;
 
@@ -15,19 +15,19 @@ fn set(layout: &Layout, parameters: &mut Parameters, name: &str, values: &[f32])
     parameters.values[i] = values.to_vec();
 }
 
-fn pass(layout: &Layout, parameters: &Parameters) -> Pass<Cpu> {
+fn pass(layout: &Layout, parameters: &Parameters) -> Pass<Fused> {
     let tensor = |(values, spec): (&Vec<f32>, &crate::parameters::Spec)| {
         Tensor::from_data(TensorData::new(values.clone(), spec.shape), &Default::default())
     };
     Pass { weights: parameters.values.iter().zip(layout.specs()).map(tensor).collect(), moments: Vec::new() }
 }
 
-fn rows(values: &[f32], columns: usize) -> Tensor<Cpu, 2> {
+fn rows(values: &[f32], columns: usize) -> Rows<Fused> {
     Tensor::from_data(TensorData::new(values.to_vec(), [values.len() / columns, columns]), &Default::default())
 }
 
 /// Running statistics that the batch moments of a pass would leave: prediction then equals training on that batch.
-fn take_moments(parameters: &mut Parameters, pass: &Pass<Cpu>) {
+fn take_moments(parameters: &mut Parameters, pass: &Pass<Fused>) {
     for (mean, variance, moments) in &pass.moments {
         parameters.values[mean.0] = moments.mean.clone();
         parameters.values[variance.0] = moments.variance.clone();

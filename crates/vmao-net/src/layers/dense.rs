@@ -2,9 +2,8 @@
 
 use super::Pass;
 use crate::kernels::linear::linear;
+use crate::operations::{Operations, Rows};
 use crate::parameters::{Layout, ParameterId, Parameters, Start};
-use crate::tape::PointBackend;
-use burn::tensor::Tensor;
 
 /// y = x W + b.
 #[derive(Debug)]
@@ -26,8 +25,8 @@ impl PlainLinear {
     }
 
     /// Training: rows × inputs → rows × channels.
-    pub(crate) fn forward<B: PointBackend>(&self, pass: &Pass<B>, x: Tensor<B, 2>) -> Tensor<B, 2> {
-        B::affine(x, pass.get(self.weight), pass.get(self.bias))
+    pub(crate) fn forward<O: Operations>(&self, pass: &Pass<O>, x: Rows<O>) -> Rows<O> {
+        O::affine(x, pass.get(self.weight), pass.get(self.bias))
     }
 
     /// Prediction, the weights copied out.

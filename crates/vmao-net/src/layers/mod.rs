@@ -16,23 +16,21 @@ pub(crate) use set_abstraction::SetAbstraction;
 pub(crate) use set_up_conv::{FoldedUpConv, SetUpConv};
 pub(crate) use shared_mlp::{FoldedGroup, GroupedMlp};
 
-use crate::kernels::norm::Moments;
+use crate::operations::{Operations, Rows};
 use crate::parameters::ParameterId;
-use crate::tape::PointBackend;
-use burn::tensor::Tensor;
 
 /// One training pass: the parameters as tensors, and the batch moments that the pass met.
 #[derive(Debug)]
-pub(crate) struct Pass<B: PointBackend> {
+pub(crate) struct Pass<O: Operations> {
     /// Every array of the layout.
-    pub(crate) weights: Vec<Tensor<B, 2>>,
+    pub(crate) weights: Vec<Rows<O>>,
     /// Mean and variance arrays of each normalisation, with the moments of this batch.
-    pub(crate) moments: Vec<(ParameterId, ParameterId, Moments)>,
+    pub(crate) moments: Vec<(ParameterId, ParameterId, O::Moments)>,
 }
 
-impl<B: PointBackend> Pass<B> {
+impl<O: Operations> Pass<O> {
     /// The array at `id`.
-    pub(crate) fn get(&self, id: ParameterId) -> Tensor<B, 2> {
+    pub(crate) fn get(&self, id: ParameterId) -> Rows<O> {
         self.weights[id.0].clone()
     }
 }

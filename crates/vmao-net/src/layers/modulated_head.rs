@@ -2,9 +2,8 @@
 
 use super::Pass;
 use crate::kernels::modulated::{Shape, modulated, weights_of};
+use crate::operations::{Operations, Rows};
 use crate::parameters::{Layout, ParameterId, Parameters, Start};
-use crate::tape::PointBackend;
-use burn::tensor::Tensor;
 
 /// y = h W(m) + b with W(m) = W₀ + Σᵢ mᵢ Wᵢ, where m = [latent code, a linear map of the scene's coarsest features].
 #[derive(Debug)]
@@ -31,14 +30,8 @@ impl ModulatedHead {
     }
 
     /// Training: rows × inputs and clouds × modulators → rows × channels.
-    pub(crate) fn forward<B: PointBackend>(
-        &self,
-        pass: &Pass<B>,
-        h: Tensor<B, 2>,
-        m: Tensor<B, 2>,
-        starts: &[usize],
-    ) -> Tensor<B, 2> {
-        B::modulated(h, m, pass.get(self.weight), pass.get(self.bias), starts)
+    pub(crate) fn forward<O: Operations>(&self, pass: &Pass<O>, h: Rows<O>, m: Rows<O>, starts: &[usize]) -> Rows<O> {
+        O::modulated(h, m, pass.get(self.weight), pass.get(self.bias), starts)
     }
 
     /// Prediction.

@@ -1,13 +1,10 @@
 //! A linear map, batch normalisation and ReLU.
 
 use super::Pass;
-use crate::kernels::edge::Edges;
 use crate::kernels::matmul::{View, Write, product};
 use crate::kernels::norm::{Moments, affine};
+use crate::operations::{Operations, Rows};
 use crate::parameters::{Layout, ParameterId, Parameters, Start};
-use crate::tape::PointBackend;
-use burn::tensor::Tensor;
-use std::sync::Arc;
 
 /// y = relu(bn(x W)). No bias before the normalisation, which would remove it.
 #[derive(Debug)]
@@ -36,23 +33,17 @@ impl NormLinear {
     }
 
     /// Training: rows × inputs → rows × channels, or the largest of every `pool` rows.
-    pub(crate) fn forward<B: PointBackend>(&self, pass: &mut Pass<B>, x: Tensor<B, 2>, pool: usize) -> Tensor<B, 2> {
+    pub(crate) fn forward<O: Operations>(&self, pass: &mut Pass<O>, x: Rows<O>, pool: usize) -> Rows<O> {
         let (weight, gain, bias) = (pass.get(self.weight), pass.get(self.gain), pass.get(self.bias));
-        let (y, moments) = B::linear_norm_relu(x, weight, gain, bias, pool);
+        let (y, moments) = O::linear_norm_relu(x, weight, gain, bias, pool);
         pass.moments.push((self.mean, self.variance, moments));
         y
     }
 
     /// Training, on [offset, x of the source] rows: table rows × (inputs − 3) → edges × channels, or the largest of every `pool`.
-    pub(crate) fn forward_edges<B: PointBackend>(
-        &self,
-        pass: &mut Pass<B>,
-        x: Tensor<B, 2>,
-        edges: &Arc<Edges>,
-        pool: usize,
-    ) -> Tensor<B, 2> {
+    pub(crate) fn forward_edges<O: Operations>(&self, pass: &mut Pass<O>, x: Rows<O>, edges: &O::Edges, pool: usize) -> Rows<O> {
         let (weight, gain, bias) = (pass.get(self.weight), pass.get(self.gain), pass.get(self.bias));
-        let (y, moments) = B::edge_norm_relu(x, weight, gain, bias, edges, pool);
+        let (y, moments) = O::edge_norm_relu(x, weight, gain, bias, edges, pool);
         pass.moments.push((self.mean, self.variance, moments));
         y
     }

@@ -2,11 +2,8 @@
 
 use super::{FoldedGroup, GroupedMlp, Pass};
 use crate::config::AbstractionConfig;
-use crate::kernels::edge::Edges;
+use crate::operations::{Operations, Rows};
 use crate::parameters::{Layout, Parameters};
-use crate::tape::PointBackend;
-use burn::tensor::Tensor;
-use std::sync::Arc;
 
 /// Carries the features of a cloud to fewer points: ball around each centroid → shared perceptron → maximum.
 #[derive(Debug)]
@@ -34,7 +31,7 @@ impl SetAbstraction {
     }
 
     /// Training: finer points × inputs → (clouds · centroids) × channels.
-    pub(crate) fn forward<B: PointBackend>(&self, pass: &mut Pass<B>, finer: Tensor<B, 2>, balls: &Arc<Edges>) -> Tensor<B, 2> {
+    pub(crate) fn forward<O: Operations>(&self, pass: &mut Pass<O>, finer: Rows<O>, balls: &O::Edges) -> Rows<O> {
         let y = self.group.forward(pass, finer, balls, self.num_neighbours);
         let [rows, channels] = y.dims();
         assert!(rows.is_multiple_of(self.num_centroids) && channels == self.channels, "{rows} x {channels} abstracted features");

@@ -3,12 +3,10 @@
 use super::{Folded, FoldedGroup, GroupedMlp, NormLinear, Pass};
 use crate::config::UpConvConfig;
 use crate::kernels::blocks::BLOCK;
-use crate::kernels::edge::Edges;
+use crate::operations::{Operations, Rows};
 use crate::parameters::{Layout, Parameters};
-use crate::tape::PointBackend;
 use burn::tensor::Tensor;
 use rayon::prelude::*;
-use std::sync::Arc;
 
 /// Carries coarse features to a finer cloud.
 ///
@@ -41,13 +39,13 @@ impl SetUpConv {
     }
 
     /// Training: coarse points × coarse width, and skip features of the fine points, → fine points × channels.
-    pub(crate) fn forward<B: PointBackend>(
+    pub(crate) fn forward<O: Operations>(
         &self,
-        pass: &mut Pass<B>,
-        coarse: Tensor<B, 2>,
-        mut skip: Vec<Tensor<B, 2>>,
-        nearest: &Arc<Edges>,
-    ) -> Tensor<B, 2> {
+        pass: &mut Pass<O>,
+        coarse: Rows<O>,
+        mut skip: Vec<Rows<O>>,
+        nearest: &O::Edges,
+    ) -> Rows<O> {
         let pooled = self.group.forward(pass, coarse, nearest, self.num_neighbours);
         let [fine, _] = pooled.dims();
         assert!(skip.iter().all(|s| s.dims()[0] == fine), "a skip feature for each of {fine} fine points");

@@ -1,14 +1,12 @@
 //! The perceptron that set abstraction and set up-convolution share over all neighbour pairs, and the maximum after it.
 
 use super::{Folded, NormLinear, Pass};
-use crate::kernels::edge::{Edges, add_offsets};
+use crate::kernels::edge::add_offsets;
 use crate::kernels::linear::linear;
 use crate::kernels::max_pool::max_pool;
+use crate::operations::{Operations, Rows};
 use crate::parameters::{Layout, Parameters};
-use crate::tape::PointBackend;
-use burn::tensor::Tensor;
 use rayon::prelude::*;
-use std::sync::Arc;
 
 /// For each centre: [offset, feature] of its k neighbours → shared perceptron → maximum over the k.
 #[derive(Debug)]
@@ -27,13 +25,7 @@ impl GroupedMlp {
     }
 
     /// Training: sources × inputs → centres × channels; `edges` holds centres × k pairs.
-    pub(crate) fn forward<B: PointBackend>(
-        &self,
-        pass: &mut Pass<B>,
-        x: Tensor<B, 2>,
-        edges: &Arc<Edges>,
-        k: usize,
-    ) -> Tensor<B, 2> {
+    pub(crate) fn forward<O: Operations>(&self, pass: &mut Pass<O>, x: Rows<O>, edges: &O::Edges, k: usize) -> Rows<O> {
         // The maximum is taken inside the last layer: its rows are never written out.
         let pool = |last: bool| if last { k } else { 1 };
         let mut y = self.first.forward_edges(pass, x, edges, pool(self.rest.is_empty()));

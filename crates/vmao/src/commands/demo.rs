@@ -4,6 +4,7 @@ use super::{CommonOptions, Session, whole_run};
 use crate::{
     failure::Failure,
     output::{Layout, print},
+    training_device::DeviceOptions,
 };
 use std::path::{Path, PathBuf};
 
@@ -12,6 +13,8 @@ pub(super) struct DemoArguments {
     /// Go on with the run in --out that was stopped
     #[arg(long, requires = "out")]
     resume: bool,
+    #[command(flatten)]
+    device: DeviceOptions,
     #[command(flatten)]
     pub(super) common: CommonOptions,
 }
@@ -22,7 +25,8 @@ pub(super) fn run(arguments: &DemoArguments, mut session: Session) -> Result<(),
         Some(out) if arguments.resume && whole_run::begun(&session, out)? => out.clone(),
         _ => session.output_directory(&unused(Path::new("runs/demo")))?,
     };
-    let (results, answer) = session.pool()?.install(|| whole_run::run(&session, &directory, arguments.resume))?;
+    let (results, answer) =
+        session.pool()?.install(|| whole_run::run(&session, &directory, arguments.device, arguments.resume))?;
     match session.layout {
         Layout::Line => session.print(&answer),
         Layout::Indented => {

@@ -7,6 +7,7 @@ use crate::{
     learning::json_lines,
     output::{Layout, log, print, write_whole},
     published::markdown,
+    training_device::DeviceOptions,
 };
 use anyhow::Context;
 use std::{io::Write, path::Path};
@@ -19,6 +20,8 @@ pub(super) struct ReproduceArguments {
     /// Trials of each cell, over the configuration's
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..))]
     trials: Option<u64>,
+    #[command(flatten)]
+    device: DeviceOptions,
     #[command(flatten)]
     pub(super) common: CommonOptions,
 }
@@ -33,7 +36,7 @@ pub(super) fn run(arguments: &ReproduceArguments, mut session: Session) -> Resul
     } else {
         session.output_directory(&directory)?;
     }
-    let (results, answer) = session.pool()?.install(|| whole_run::run(&session, &directory, resume))?;
+    let (results, answer) = session.pool()?.install(|| whole_run::run(&session, &directory, arguments.device, resume))?;
     let lines: Vec<TrialLine> = json_lines(&directory.join("trials.jsonl"))?;
     let table = markdown(&results, &lines, session.config.scene.timestep);
     let place = directory.join("results.md");

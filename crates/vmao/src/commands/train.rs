@@ -6,10 +6,11 @@ use crate::{
     failure::{Failure, OrBadInput},
     interruption::keeps,
     learning::train_all,
+    training_device::DeviceOptions,
 };
 use serde::Serialize;
 use std::path::{Path, PathBuf};
-use vmao_net::ModelKind;
+use vmao_net::{Device, ModelKind};
 
 #[derive(Debug, clap::Args)]
 pub(super) struct TrainArguments {
@@ -19,6 +20,8 @@ pub(super) struct TrainArguments {
     /// The contact model
     #[arg(long, value_enum)]
     model: Model,
+    #[command(flatten)]
+    device: DeviceOptions,
     #[command(flatten)]
     pub(super) common: CommonOptions,
 }
@@ -34,6 +37,7 @@ enum Model {
 #[derive(Debug, Serialize)]
 struct Answer {
     checkpoint: PathBuf,
+    device: Device,
     epochs: usize,
     validation: Vec<Validation>,
 }
@@ -56,11 +60,12 @@ pub(super) fn run(arguments: &TrainArguments, session: &Session) -> Result<(), F
     }
     let directory = session.output_directory(&Path::new("runs/train").join(kind.name()))?;
     keeps(format!("the data set is kept, networks that were finished are in {}; run it again", directory.display()));
-    let lines = session.pool()?.install(|| train_all(&session.config, kind, &records, session.info.seed, &directory))?;
+    let device = arguments.device.resolve();
+    let lines = session.pool()?.install(|| train_all(&session.config, kind, &records, session.info.seed, device, &directory))?;
     let last = |grasp: usize| lines.iter().rfind(|line| line.grasp == grasp);
     let validation = (0..crate::scenes::grasps(&session.config)?)
         .filter_map(last)
         .map(|line| Validation { grasp: line.grasp, reconstruction: line.validation_reconstruction, kl: line.validation_kl })
         .collect();
-    session.print(&Answer { checkpoint: directory, epochs: session.config.train.epochs, validation })
+    session.print(&Answer { checkpoint: directory, device, epochs: session.config.train.epochs, validation })
 }

@@ -11,6 +11,7 @@ use crate::{
     results::Results,
     run_report::write_report,
     scenes::grasps,
+    training_device::DeviceOptions,
 };
 use serde::Serialize;
 use std::path::{Path, PathBuf};
@@ -33,7 +34,12 @@ pub(super) fn explore_what_is_evaluated(session: &mut Session) -> Result<(), Fai
 }
 
 /// Runs all stages into `directory`; with `resume`, those that an earlier call left unfinished.
-pub(super) fn run(session: &Session, directory: &Path, resume: bool) -> Result<(Results, Answer), Failure> {
+pub(super) fn run(
+    session: &Session,
+    directory: &Path,
+    device: DeviceOptions,
+    resume: bool,
+) -> Result<(Results, Answer), Failure> {
     let (config, seed) = (&session.config, session.info.seed);
     let data = directory.join("data");
     let writer = DatasetWriter::open(&data)?;
@@ -44,13 +50,14 @@ pub(super) fn run(session: &Session, directory: &Path, resume: bool) -> Result<(
     log(&format!("explored: {} of {} trials accepted", explored.successes, explored.trials));
     let records = dataset::load(&data)?;
     keeps(format!("what is finished is kept in {}; the same command with --resume and --out goes on", directory.display()));
+    let device = device.resolve();
     let mut models = Vec::new();
     for kind in ModelKind::ALL {
         if config.evaluate.methods.iter().any(|method| method.model() == kind) {
             let place = directory.join("models").join(kind.name());
             // The curves are written last: with them, all networks are there.
             if !(resume && place.join("training.jsonl").exists()) {
-                train_all(config, kind, &records, seed, &place)?;
+                train_all(config, kind, &records, seed, device, &place)?;
             }
             models.push(load(&place, grasps(config)?)?);
         }
