@@ -18,6 +18,22 @@ pub struct Acceptance {
     sizes: Vec<Size>,
     near_duplicates: u64,
     failures: BTreeMap<FailureStage, u64>,
+    trials: u64,
+    successes: u64,
+    rounds: Vec<RoundSummary>,
+}
+
+/// What exploration had come to after a round; a line of `exploration.json`.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct RoundSummary {
+    /// Trials so far.
+    pub trials: u64,
+    /// Accepted ones so far.
+    pub successes: u64,
+    /// Near-duplicates so far.
+    pub near_duplicates: u64,
+    /// Share of the surfaces touched so far, the mean over parts.
+    pub coverage: f64,
 }
 
 #[derive(Debug)]
@@ -49,11 +65,15 @@ impl Acceptance {
             sizes: scenes.iter().map(size).collect(),
             near_duplicates: 0,
             failures: FailureStage::ALL.into_iter().map(|stage| (stage, 0)).collect(),
+            trials: 0,
+            successes: 0,
+            rounds: Vec::new(),
         }
     }
 
     /// Counts a record of the `scene`-th size; whether the label set shall learn from it.
     pub fn add(&mut self, scene: usize, record: &TrialRecord) -> bool {
+        self.trials += 1;
         if let TrialOutcome::Failed(stage) = record.outcome {
             *self.failures.entry(stage).or_default() += 1;
         }
@@ -64,8 +84,11 @@ impl Acceptance {
         if !record.outcome.is_success() {
             return false;
         }
+        self.successes += 1;
         for contact in &tuple {
-            contact.fingers.iter().for_each(|finger| size.coverage[usize::from(contact.part.0)].touch(finger));
+            // A file may name a part that the configuration beside it does not have.
+            let Some(coverage) = size.coverage.get_mut(usize::from(contact.part.0)) else { continue };
+            contact.fingers.iter().for_each(|finger| coverage.touch(finger));
         }
         size.accepted.push(tuple);
         !near || self.handling == NearDuplicates::Keep
@@ -82,13 +105,25 @@ impl Acceptance {
         AcceptanceSummary { near_duplicates: self.near_duplicates, failures: self.failures.clone(), coverage }
     }
 
-    /// The counts in a few words, for the progress line.
+    /// Notes what there is at the end of a round.
+    pub fn end_round(&mut self) {
+        let AcceptanceSummary { near_duplicates, coverage, .. } = self.summary();
+        let coverage = coverage.values().sum::<f64>() / coverage.len().max(1) as f64;
+        let Self { trials, successes, .. } = *self;
+        self.rounds.push(RoundSummary { trials, successes, near_duplicates, coverage });
+    }
+
+    /// The rounds so far.
+    pub fn rounds(&self) -> &[RoundSummary] {
+        &self.rounds
+    }
+
+    /// The counts at the end of the last round in a few words, for the progress line.
     pub fn words(&self) -> String {
-        let AcceptanceSummary { near_duplicates, failures, coverage } = self.summary();
-        let mean = 100.0 * coverage.values().sum::<f64>() / coverage.len().max(1) as f64;
-        let worst = failures.iter().max_by_key(|(_, count)| **count).filter(|(_, count)| **count > 0);
+        let covered = 100.0 * self.rounds.last().map_or(0.0, |round| round.coverage);
+        let worst = self.failures.iter().max_by_key(|(_, count)| **count).filter(|(_, count)| **count > 0);
         let worst = worst.map_or_else(String::new, |(stage, count)| format!(", {count} {}", stage.name()));
-        format!("{mean:.0} % of surfaces touched, {near_duplicates} near-duplicates{worst}")
+        format!("{covered:.0} % of surfaces touched, {} near-duplicates{worst}", self.near_duplicates)
     }
 }
 

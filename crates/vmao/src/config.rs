@@ -167,7 +167,12 @@ pub struct EvaluateConfig {
 impl Config {
     /// The shipped configuration, changed by a file and then by `section.key=value` settings in turn.
     pub fn load(file: Option<&Path>, settings: &[String]) -> Result<Self, ConfigError> {
-        let mut layers = Vec::new();
+        Self::load_over(None, file, settings)
+    }
+
+    /// The same over one of the further shipped configurations, (name, text).
+    pub fn load_over(base: Option<(&str, &str)>, file: Option<&Path>, settings: &[String]) -> Result<Self, ConfigError> {
+        let mut layers: Vec<Layer> = base.map(|(name, text)| Layer::File(name.to_owned(), text.to_owned())).into_iter().collect();
         if let Some(path) = file {
             layers.push(Layer::file(path)?);
         }

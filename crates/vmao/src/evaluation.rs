@@ -2,14 +2,17 @@
 
 use crate::config::Config;
 use crate::failure::Failure;
+use crate::kept_trials::KeptTrials;
 use crate::learned_contacts::LearnedContacts;
 use crate::output::{progress_bar, write_whole};
 use crate::provenance::RunInfo;
 use crate::results::{Cell, Method, Results};
 use crate::scenes::scenes;
+use crate::significance::comparisons;
 use anyhow::Context;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
+use std::collections::{BTreeMap, BTreeSet};
 use std::io::Write;
 use std::path::Path;
 use vmao_core::order::GraspOrder;
@@ -77,8 +80,10 @@ impl<'a> Evaluation<'a> {
         Some(run_trial(scene, &self.config.trial_config(), model, order, (self.seed, index), recording))
     }
 
-    /// Runs every cell in the current rayon pool; lines by order, method, index.
-    pub fn run(&self) -> Vec<TrialLine> {
+    /// Runs every cell in the current rayon pool, less the trials that are `there`; lines by order, method, index.
+    ///
+    /// Every trial is kept as soon as it ends. Lines of trials that the table does not have are refused.
+    pub fn run(&self, kept: &KeptTrials, there: Vec<TrialLine>) -> Result<Vec<TrialLine>, Failure> {
         let evaluate = &self.config.evaluate;
         let mut jobs = Vec::new();
         for &order in &evaluate.orders {
@@ -86,16 +91,28 @@ impl<'a> Evaluation<'a> {
                 jobs.extend((0..evaluate.trials).map(|index| (order, *method, index)));
             }
         }
+        let key = |line: &TrialLine| (line.order, line.method, line.index);
+        let mut lines: BTreeMap<_, TrialLine> = there.into_iter().map(|line| (key(&line), line)).collect();
+        let wanted: BTreeSet<_> = jobs.iter().copied().collect();
+        if let Some((order, method, index)) = lines.keys().find(|key| !wanted.contains(key)) {
+            let (order, method) = (order.name(), method.name());
+            return Err(Failure::bad_input(format!("a kept trial {index} of {method}, {order}: not of this table")));
+        }
         let bar = progress_bar("evaluate", jobs.len() as u64);
-        let line = |&(order, method, index): &(GraspOrder, Method, u64)| {
-            let trial = self.trial(order, method, index, Recording::Off);
+        bar.set_position(lines.len() as u64);
+        bar.reset_eta();
+        let missing: Vec<_> = jobs.iter().filter(|job| !lines.contains_key(job)).collect();
+        let line = |&&(order, method, index): &&(GraspOrder, Method, u64)| {
+            let Some(trial) = self.trial(order, method, index, Recording::Off) else { return Ok(None) };
+            let line = TrialLine::new(order, method, &trial);
+            kept.keep(&line)?;
             bar.inc(1);
-            trial.map(|trial| TrialLine::new(order, method, &trial))
+            Ok(Some(line))
         };
-        // `filter_map` keeps the order of an indexed iterator's items.
-        let lines = jobs.par_iter().filter_map(line).collect();
+        let run: Vec<Option<TrialLine>> = missing.par_iter().map(line).collect::<Result<_, Failure>>()?;
         bar.finish();
-        lines
+        lines.extend(run.into_iter().flatten().map(|line| (key(&line), line)));
+        Ok(jobs.iter().filter_map(|job| lines.remove(job)).collect())
     }
 
     /// The cells that these trials make.
@@ -109,7 +126,7 @@ impl<'a> Evaluation<'a> {
                 cells.push(cell.with_goals(of_cell().map(|line| line.goal)));
             }
         }
-        Results::new(info, cells)
+        Results { comparisons: comparisons(lines), ..Results::new(info, cells) }
     }
 }
 

@@ -1,15 +1,17 @@
 //! Algorithm 1 on disk: rounds of trials that grow the label set, each kept for good before the next begins.
 
-use crate::acceptance::{Acceptance, AcceptanceSummary};
+use crate::acceptance::{Acceptance, AcceptanceSummary, RoundSummary};
 use crate::config::Config;
 use crate::dataset::{DatasetWriter, Digester, RoundFile, read_round, stored};
 use crate::failure::{Failure, OrBadInput};
 use crate::interruption::keeps;
-use crate::output::{log, progress_bar};
+use crate::output::{log, progress_bar, write_whole};
 use crate::provenance::RunInfo;
 use crate::scenes::scenes;
 use crate::sharing::{Shards, Share};
+use anyhow::Context;
 use serde::Serialize;
+use std::io::Write;
 use std::ops::Range;
 use std::path::Path;
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -28,9 +30,27 @@ pub struct Explored {
     pub rate: f64,
     /// SHA-256 of the records in canonical order.
     pub digest: String,
-    /// Near-duplicates, failures and coverage; not known of a merged data set.
+    /// Near-duplicates, failures and coverage.
     #[serde(flatten)]
-    pub acceptance: Option<AcceptanceSummary>,
+    pub acceptance: AcceptanceSummary,
+    /// What there was after each round; in the file only.
+    #[serde(skip)]
+    pub rounds: Vec<RoundSummary>,
+}
+
+impl Explored {
+    /// Writes `exploration.json` beside the rounds: the answer, and what there was after each round.
+    pub fn save(&self, directory: &Path) -> Result<(), Failure> {
+        #[derive(Serialize)]
+        struct Stored<'a> {
+            #[serde(flatten)]
+            explored: &'a Explored,
+            rounds: &'a [RoundSummary],
+        }
+        let path = directory.join("exploration.json");
+        let text = serde_json::to_string_pretty(&Stored { explored: self, rounds: &self.rounds })?;
+        Ok(write_whole(&path, |file| writeln!(file, "{text}")).with_context(|| path.display().to_string())?)
+    }
 }
 
 /// What earlier trials have taught.
@@ -38,6 +58,21 @@ pub struct Explored {
 pub struct Learned {
     labels: LabelSet,
     acceptance: Acceptance,
+}
+
+impl Learned {
+    /// Near-duplicates, failures and coverage so far.
+    pub fn acceptance(&self) -> AcceptanceSummary {
+        self.acceptance.summary()
+    }
+
+    /// What it came to; `digest` is that of the records learned from.
+    pub fn explored(&self, digest: String) -> Explored {
+        let rounds = self.acceptance.rounds().to_vec();
+        let (trials, successes) = rounds.last().map_or((0, 0), |round| (round.trials, round.successes));
+        let (rate, acceptance) = (successes as f64 / trials.max(1) as f64, self.acceptance.summary());
+        Explored { trials, successes, rate, digest, acceptance, rounds }
+    }
 }
 
 /// What the trials of a run take place in: all that (seed, index, label set) do not decide.
@@ -57,18 +92,27 @@ impl<'a> Explorer<'a> {
         Ok(Self { config, seed, scenes: scenes(config, InstanceSet::Train)?, trial_config: config.trial_config(), proposals })
     }
 
+    /// Names of the object's parts.
+    pub fn part_names(&self) -> Vec<String> {
+        let object = self.scenes.first().map(|scene| &scene.object);
+        object.map(|object| object.parts.iter().map(|part| part.name.clone()).collect()).unwrap_or_default()
+    }
+
     /// T ← D.
     pub fn demonstrated(&self) -> Learned {
         let acceptance = Acceptance::new(&self.config.explore, &self.scenes);
         Learned { labels: LabelSet::demonstrated(&self.scenes), acceptance }
     }
 
-    /// T ← T ∪ {s′}, unless s′ is a near-duplicate that is to be left out.
-    pub fn learn(&self, learned: &mut Learned, record: &TrialRecord) {
-        let scene = scene_of_trial(self.seed, record.index, self.scenes.len());
-        if learned.acceptance.add(scene, record) {
-            learned.labels.learn(scene, record);
+    /// T ← T ∪ {s′} for the successes of a round, unless s′ is a near-duplicate that is to be left out.
+    pub fn learn(&self, learned: &mut Learned, round: &[TrialRecord]) {
+        for record in round {
+            let scene = scene_of_trial(self.seed, record.index, self.scenes.len());
+            if learned.acceptance.add(scene, record) {
+                learned.labels.learn(scene, record);
+            }
         }
+        learned.acceptance.end_round();
     }
 
     /// Runs these trials of one round in the current rayon pool, as they are stored.
@@ -122,10 +166,8 @@ pub fn explore(
             bar.set_prefix(format!("{tried} trials, {:.0} % accepted, {so_far}", 100.0 * bar.position() as f64 / tried as f64));
         };
         let round = rounds.obtain(&indices, &|indices| explorer.run(&learned, indices, &done))?;
-        for record in &round {
-            explorer.learn(&mut learned, record);
-            successes += u64::from(record.outcome.is_success());
-        }
+        explorer.learn(&mut learned, &round);
+        successes += round.iter().filter(|record| record.outcome.is_success()).count() as u64;
         trials = indices.end;
     }
     bar.finish();
@@ -134,8 +176,9 @@ pub fn explore(
         let indices = first..first.saturating_add(config.explore.round_size).min(trials);
         rounds.read(&indices)?.iter().for_each(|record| digester.add(record));
     }
-    let (rate, acceptance) = (successes as f64 / trials.max(1) as f64, Some(learned.acceptance.summary()));
-    Ok(Explored { trials, successes, rate, digest: digester.finish(), acceptance })
+    let explored = learned.explored(digester.finish());
+    explored.save(writer.directory())?;
+    Ok(explored)
 }
 
 /// Where finished rounds are: all in one directory, or each round shared out over several.

@@ -18,6 +18,9 @@ use vmao_net::{Checkpoint, ContactNetwork, Device, EpochReport, Example, ModelKi
 /// Largest checkpoint file that is read (bytes).
 const MAX_CHECKPOINT_BYTES: u64 = 256 << 20;
 
+/// The files of a network.
+const CHECKPOINT_FILES: [&str; 2] = ["model.safetensors", "config.json"];
+
 /// One line of `training.jsonl`. Losses in nats; none where there was nothing to measure.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct EpochLine {
@@ -158,12 +161,26 @@ fn read(path: &Path) -> Result<Vec<u8>, Failure> {
     fs::read(path).with_context(missing).or_bad_input()
 }
 
+/// Refuses to go on with other networks than those that a run holds.
+pub fn check_same(given: &Path, kept: &Path, grasps: usize) -> Result<(), Failure> {
+    for grasp in 0..grasps {
+        for name in CHECKPOINT_FILES {
+            let (given, kept) = (grasp_directory(given, grasp).join(name), grasp_directory(kept, grasp).join(name));
+            if read(&given)? != read(&kept)? {
+                let (given, kept) = (given.display(), kept.display());
+                return Err(Failure::bad_input(format!("{given}: another network than {kept}, which the kept trials ran with")));
+            }
+        }
+    }
+    Ok(())
+}
+
 /// Copies a checkpoint directory, so that a run holds the models it speaks of.
 pub fn copy(from: &Path, to: &Path, grasps: usize) -> Result<(), Failure> {
     for grasp in 0..grasps {
         let (source, target) = (grasp_directory(from, grasp), grasp_directory(to, grasp));
         fs::create_dir_all(&target).with_context(|| target.display().to_string())?;
-        for name in ["model.safetensors", "config.json"] {
+        for name in CHECKPOINT_FILES {
             let bytes = read(&source.join(name))?;
             let path = target.join(name);
             write_whole(&path, |file| file.write_all(&bytes)).with_context(|| path.display().to_string())?;

@@ -2,7 +2,7 @@
 
 use crate::config::Config;
 use crate::dataset::{DatasetWriter, Digester, RoundFile, digest, found_files, read_round};
-use crate::exploration::{Explored, finished, next_round, of_seed};
+use crate::exploration::{Explored, Explorer, finished, next_round, of_seed};
 use crate::failure::{Failure, OrBadInput};
 use crate::output::log;
 use crate::provenance::RunInfo;
@@ -61,9 +61,11 @@ impl Pieces {
 
     /// Writes the rounds of the single run. Every trial must be there, and the run must have come to its end.
     pub fn merge(&self, writer: &DatasetWriter) -> Result<Explored, Failure> {
+        let explorer = Explorer::new(&self.config, self.info.seed)?;
+        let mut learned = explorer.demonstrated();
         let mut kept = Vec::new();
         let (mut trials, mut successes) = (0, 0);
-        while let Some(indices) = next_round(&self.config, trials, successes) {
+        while let Some(indices) = explorer.next_round(trials, successes) {
             let round = self.round(&indices)?;
             let file = RoundFile::of(writer.directory(), indices.start, indices.end - 1);
             match finished(writer, self.info.seed, &file)? {
@@ -73,14 +75,16 @@ impl Pieces {
             }
             successes += round.iter().filter(|record| record.outcome.is_success()).count() as u64;
             trials = indices.end;
+            explorer.learn(&mut learned, &round);
             kept.push(file);
         }
         let mut digester = Digester::new(trials as usize);
         for file in &kept {
             read_round(file)?.iter().for_each(|record| digester.add(record));
         }
-        let rate = successes as f64 / trials.max(1) as f64;
-        Ok(Explored { trials, successes, rate, digest: digester.finish(), acceptance: None })
+        let explored = learned.explored(digester.finish());
+        explored.save(writer.directory())?;
+        Ok(explored)
     }
 
     /// The records of a round; trials that several shards ran must be the same.

@@ -49,7 +49,7 @@ pub fn log(line: &str) {
 /// A progress bar over `length` units on stderr; invisible unless stderr is a terminal.
 pub fn progress_bar(label: &str, length: u64) -> ProgressBar {
     let bar = ProgressBar::new(length).with_message(label.to_owned());
-    let template = "{msg:<24} {bar:30} {pos}/{len}  {elapsed} elapsed, {eta} left  {prefix}";
+    let template = "{msg:<24} {bar:30} {pos}/{len}  {per_sec}, {elapsed} elapsed, {eta} left  {prefix}";
     match ProgressStyle::with_template(template) {
         Ok(style) => bar.with_style(style.progress_chars("━╸ ")),
         Err(_) => bar,

@@ -185,7 +185,7 @@ fn verify_exploration(
         if chosen.last().is_none_or(|&last| round.last().is_none_or(|record| record.index >= last)) {
             break;
         }
-        round.iter().for_each(|record| explorer.learn(&mut labels, record));
+        explorer.learn(&mut labels, &round);
     }
     Ok(())
 }

@@ -1,6 +1,7 @@
 //! Success rates with intervals, failures by stage: `results.json` and the table on stdout.
 
 use crate::provenance::{COMMIT, RunInfo, VERSION};
+use crate::significance::{self, Comparison};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use vmao_core::{
@@ -266,13 +267,24 @@ pub struct Results {
     pub seed: u64,
     /// The cells of the table.
     pub cells: Vec<Cell>,
+    /// Methods compared on the same trials; not in files of older versions.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub comparisons: Vec<Comparison>,
 }
 
 impl Results {
     /// The results of this run of this program.
     pub fn new(info: &RunInfo, cells: Vec<Cell>) -> Self {
         let (version, commit) = (VERSION.to_owned(), COMMIT.to_owned());
-        Self { schema: 1, version, commit, config_sha256: info.config_sha256.clone(), seed: info.seed, cells }
+        Self {
+            schema: 1,
+            version,
+            commit,
+            config_sha256: info.config_sha256.clone(),
+            seed: info.seed,
+            cells,
+            comparisons: Vec::new(),
+        }
     }
 
     /// What was known of the goals of all cells; none if that is not known of every cell.
@@ -313,7 +325,9 @@ impl Results {
             rows.push(row);
         }
         let goals = self.goals().map_or_else(String::new, |counts| counts.sentence() + "\n");
-        aligned(&rows, 4) + &goals
+        let compared = significance::table(&self.comparisons);
+        let gap = if compared.is_empty() { "" } else { "\n" };
+        aligned(&rows, 4) + &goals + gap + &compared
     }
 }
 
@@ -431,7 +445,8 @@ mod tests {
     fn the_table_lines_up() {
         let other = Cell::new("sticks-10", &["sawyer".into()], GraspOrder::Parallel, Method::Top1, []);
         let (version, commit, config_sha256) = (String::new(), String::new(), String::new());
-        let results = Results { schema: 1, version, commit, config_sha256, seed: 0, cells: vec![cell(), other] };
+        let results =
+            Results { schema: 1, version, commit, config_sha256, seed: 0, cells: vec![cell(), other], comparisons: Vec::new() };
         let expected = "\
 object     robots         order       method  success  rate %  95 % interval  no-contact  unreachable  no-plan  collision  slip  threshold  timeout
 ───────────────────────────────────────────────────────────────────────────────────────────────────────────────────────────────────────────────────

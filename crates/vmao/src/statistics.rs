@@ -1,13 +1,16 @@
 //! What is in a data set: outcomes, contacts of each part, and how the accepted trials are spread.
 
+use crate::acceptance::AcceptanceSummary;
 use crate::config::Config;
 use crate::dataset;
+use crate::exploration::{Explorer, Learned};
 use crate::failure::{Failure, OrBadInput};
+use crate::provenance::RunInfo;
 use crate::results::{aligned, wilson95};
 use serde::Serialize;
 use std::collections::BTreeMap;
 use std::path::Path;
-use vmao_core::catalogue::{INSTANCES, InstanceSet};
+use vmao_core::catalogue::INSTANCES;
 use vmao_core::outcome::{FailureStage, TrialOutcome};
 use vmao_core::record::TrialRecord;
 use vmao_sim::scene_of_trial;
@@ -80,6 +83,8 @@ pub struct Statistics {
     pub digest: String,
     /// Failed trials by the first stage that failed.
     pub failures: BTreeMap<FailureStage, u64>,
+    /// Near-duplicates and how much of each part's surface accepted contacts touch, where the configuration is beside the data.
+    pub acceptance: Option<AcceptanceSummary>,
     /// By grasp order.
     pub orders: BTreeMap<&'static str, Share>,
     /// By size of the object.
@@ -154,13 +159,21 @@ impl Values {
 /// The statistics of a data set, read one round at a time.
 pub fn statistics(directory: &Path) -> Result<Statistics, Failure> {
     let mut values = Values { sizes: vec![Share::default(); usize::from(INSTANCES)], ..Values::default() };
+    let config = Config::load(Some(&directory.join("config.toml")), &[]).ok();
+    let seed = RunInfo::load(directory).ok().map(|info| info.seed);
+    let explorer = config.as_ref().zip(seed).and_then(|(config, seed)| Explorer::new(config, seed).ok());
+    let mut learned = explorer.as_ref().map(Explorer::demonstrated);
     for round in dataset::rounds(directory).or_bad_input()? {
-        round.or_bad_input()?.iter().for_each(|record| values.add(record));
+        let round = round.or_bad_input()?;
+        round.iter().for_each(|record| values.add(record));
+        if let Some((explorer, learned)) = explorer.as_ref().zip(learned.as_mut()) {
+            explorer.learn(learned, &round);
+        }
     }
     if values.successes.is_empty() {
         return Err(Failure::bad_input(format!("{}: no trials, expected a data set", directory.display())));
     }
-    let names = part_names(directory);
+    let names = explorer.as_ref().map(Explorer::part_names).unwrap_or_default();
     let parts = values.parts.into_iter().map(|(part, PartValues { tried, by_arm, width, middle })| PartContacts {
         part,
         name: names.get(usize::from(part)).cloned(),
@@ -183,6 +196,7 @@ pub fn statistics(directory: &Path) -> Result<Statistics, Failure> {
         wilson95: wilson95(successes, trials),
         digest: dataset::digest_of(directory).or_bad_input()?,
         failures: values.failures,
+        acceptance: learned.as_ref().map(Learned::acceptance),
         orders: values.orders,
         sizes: values.sizes,
         tenths,
@@ -191,14 +205,6 @@ pub fn statistics(directory: &Path) -> Result<Statistics, Failure> {
         failed_steps: Spread::of(values.failed_steps),
         final_errors: values.errors.map(Spread::of),
     })
-}
-
-/// Names of the parts; none if there is no configuration beside the data that says what the object is.
-fn part_names(directory: &Path) -> Vec<String> {
-    let file = directory.join("config.toml");
-    let items = Config::load(Some(&file), &[]).ok().and_then(|config| crate::scenes::items(&config, InstanceSet::Train).ok());
-    let parts = items.and_then(|items| items.into_iter().next()).map(|item| item.object.parts).unwrap_or_default();
-    parts.into_iter().map(|part| part.name).collect()
 }
 
 impl Statistics {
@@ -218,6 +224,10 @@ impl Statistics {
             "failures: {}\n",
             list(self.failures.iter().map(|(stage, count)| format!("{count} {}", stage.name())).collect())
         );
+        if let Some(acceptance) = &self.acceptance {
+            let covered = acceptance.coverage.iter().map(|(part, share)| format!("{part} {:.0} %", 100.0 * share));
+            text += &format!("surface touched: {}\nnear-duplicates: {}\n", list(covered.collect()), acceptance.near_duplicates);
+        }
         text += &format!("by order: {}\n", list(self.orders.iter().map(|(name, of)| format!("{name} {}", share(of))).collect()));
         text += &format!("by size:  {}\n", list(self.sizes.iter().map(share).collect()));
         text += &format!("by tenth: {}\n\n", list(self.tenths.iter().map(share).collect()));

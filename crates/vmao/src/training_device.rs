@@ -6,8 +6,8 @@ use vmao_net::Device;
 /// The option of commands that train.
 #[derive(Debug, Clone, Copy, clap::Args)]
 pub struct DeviceOptions {
-    /// Where networks are trained; without a working CUDA device it is the CPU
-    #[arg(long, value_enum, value_name = "DEVICE", default_value_t = DeviceChoice::Auto)]
+    /// Where networks are trained; without a working CUDA device it is the CPU, which alone gives the same bits everywhere
+    #[arg(long, value_enum, value_name = "DEVICE", default_value_t = DeviceChoice::Cpu)]
     pub device: DeviceChoice,
 }
 

@@ -210,7 +210,7 @@ fn ctrl_c_stops_demo_train_and_evaluate_too() {
     interrupt(&long, &at("models/top1/run.json"), &["stopped: the data set is kept", "run it again"]);
     assert!(vmao(&[&train[..], &["train.epochs=1"]].concat()).output().unwrap().status.success());
     let evaluate = ["evaluate", "--checkpoint", &models, "--trials", "100000", "--out", &table];
-    interrupt(&evaluate, &at("table/models/top1/grasp-1/config.json"), &["stopped: the networks are kept", "run it again"]);
+    interrupt(&evaluate, &at("table/models/top1/grasp-1/config.json"), &["stopped: finished trials are kept", "--resume"]);
     let demo = text(&at("demo"));
     let begun = at("demo/data/trials-00000000-00000015.parquet");
     interrupt(

@@ -93,6 +93,10 @@ fn a_trial_is_shown_and_a_data_set_described() {
     let failed: u64 = stats["failures"].as_object().unwrap().values().map(|count| count.as_u64().unwrap()).sum();
     assert_eq!(failed, count(&|record| !record.outcome.is_success()));
     assert_eq!(stats["orders"]["parallel"]["trials"], 4);
+    for key in ["coverage", "near_duplicates"] {
+        assert_eq!(stats["acceptance"][key], explored[key], "counted from the records alone");
+    }
+    assert!(explored["coverage"].as_object().unwrap().values().any(|share| share.as_f64().unwrap() > 0.0));
     let parts = stats["parts"].as_array().unwrap();
     assert_eq!(parts.iter().map(|part| part["name"].as_str().unwrap()).collect::<Vec<_>>(), ["lever-a", "lever-b"]);
     for part in parts {

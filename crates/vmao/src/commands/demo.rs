@@ -1,74 +1,36 @@
 //! `vmao demo`: the whole loop at laptop size: explore, train both models, evaluate both in both orders, report.
 
-use super::{CommonOptions, Session, evaluate::table};
+use super::{CommonOptions, Session, whole_run};
 use crate::{
-    dataset::{self, DatasetWriter},
-    exploration::explore,
     failure::Failure,
-    interruption::keeps,
-    learning::{load, train_all},
-    output::{Layout, log, print},
-    run_report::write_report,
-    scenes::grasps,
+    output::{Layout, print},
     training_device::DeviceOptions,
 };
-use serde::Serialize;
 use std::path::{Path, PathBuf};
-use vmao_net::ModelKind;
 
 #[derive(Debug, clap::Args)]
 pub(super) struct DemoArguments {
+    /// Go on with the run in --out that was stopped
+    #[arg(long, requires = "out")]
+    resume: bool,
     #[command(flatten)]
     device: DeviceOptions,
     #[command(flatten)]
     pub(super) common: CommonOptions,
 }
 
-#[derive(Debug, Serialize)]
-struct Answer {
-    report: PathBuf,
-    results: PathBuf,
-}
-
 pub(super) fn run(arguments: &DemoArguments, mut session: Session) -> Result<(), Failure> {
-    // The models are used in all the orders that are compared, so they must have seen all of them.
-    session.configure(|config| {
-        if config.explore.orders.is_empty() {
-            config.explore.orders.clone_from(&config.evaluate.orders);
-        }
-    })?;
-    let directory = session.output_directory(&unused(Path::new("runs/demo")))?;
-    let (results, report) = session.pool()?.install(|| -> Result<_, Failure> {
-        let (config, seed) = (&session.config, session.info.seed);
-        let data = directory.join("data");
-        let writer = DatasetWriter::open(&data)?;
-        session.save(&data)?;
-        let explored = explore(config, &session.info, &writer, None)?;
-        log(&format!("explored: {} of {} trials accepted", explored.successes, explored.trials));
-        let records = dataset::load(&data)?;
-        let (place, config_file) = (directory.display(), directory.join("config.toml"));
-        keeps(format!(
-            "the explored data set is kept in {}, finished networks in {place}/models; go on with `vmao train` and `vmao evaluate`, each \
-             with --config {}",
-            data.display(),
-            config_file.display()
-        ));
-        let device = arguments.device.resolve();
-        let mut models = Vec::new();
-        for kind in ModelKind::ALL {
-            if config.evaluate.methods.iter().any(|method| method.model() == kind) {
-                let place = directory.join("models").join(kind.name());
-                train_all(config, kind, &records, seed, device, &place)?;
-                models.push(load(&place, grasps(config)?)?);
-            }
-        }
-        let results = table(&session, &models, &directory)?;
-        Ok((results, write_report(&directory)?))
-    })?;
+    whole_run::explore_what_is_evaluated(&mut session)?;
+    let directory = match &session.out {
+        Some(out) if arguments.resume && whole_run::begun(&session, out)? => out.clone(),
+        _ => session.output_directory(&unused(Path::new("runs/demo")))?,
+    };
+    let (results, answer) =
+        session.pool()?.install(|| whole_run::run(&session, &directory, arguments.device, arguments.resume))?;
     match session.layout {
-        Layout::Line => session.print(&Answer { report, results: directory.join("results.json") }),
+        Layout::Line => session.print(&answer),
         Layout::Indented => {
-            Ok(print(&format!("{}\n{}\n{}", results.table(), report.display(), directory.join("results.json").display()))?)
+            Ok(print(&format!("{}\n{}\n{}", results.table(), answer.report.display(), answer.results.display()))?)
         }
     }
 }

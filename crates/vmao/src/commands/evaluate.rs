@@ -5,8 +5,9 @@ use crate::{
     evaluation::{Evaluation, save},
     failure::{Failure, OrBadInput},
     interruption::keeps,
+    kept_trials::KeptTrials,
     learned_contacts::methods,
-    learning::{copy, load},
+    learning::{check_same, copy, load},
     output::{Layout, print},
     results::Results,
 };
@@ -25,6 +26,9 @@ pub(super) struct EvaluateArguments {
     /// Trials of each cell, over the configuration's
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..))]
     trials: Option<u64>,
+    /// Go on with the table in --out that was stopped
+    #[arg(long, requires = "out")]
+    resume: bool,
     #[command(flatten)]
     pub(super) common: CommonOptions,
 }
@@ -49,26 +53,32 @@ pub(super) fn run(arguments: &EvaluateArguments, mut session: Session) -> Result
         places.push(arguments.checkpoint.clone());
     }
     let models = places.iter().map(|place| load(place, grasps)).collect::<Result<Vec<_>, _>>()?;
+    if let Some(out) = session.out.as_ref().filter(|_| arguments.resume) {
+        session.info.check_same_run(out).or_bad_input()?;
+    }
     let directory = session.output_directory(Path::new("runs/evaluate"))?;
     for (place, (kind, _)) in places.iter().zip(&models) {
         let kept = directory.join("models").join(kind.name());
-        if place.canonicalize().or_bad_input()? != kept.canonicalize().unwrap_or_default() {
+        if arguments.resume && kept.is_dir() {
+            check_same(place, &kept, grasps)?;
+        } else if place.canonicalize().or_bad_input()? != kept.canonicalize().unwrap_or_default() {
             copy(place, &kept, grasps)?;
         }
     }
-    keeps(format!("the networks are kept in {}, trials of an unfinished table are not; run it again", directory.display()));
-    let results = session.pool()?.install(|| table(&session, &models, &directory))?;
+    keeps(format!("finished trials are kept in {}; the same command with --resume and --out goes on", directory.display()));
+    let results = session.pool()?.install(|| table(&session, &models, &directory, arguments.resume))?;
     match session.layout {
         Layout::Line => session.print(&results),
         Layout::Indented => Ok(print(results.table().trim_end())?),
     }
 }
 
-/// Runs the configured cells and writes their results.
+/// Runs the configured cells, with `resume` those of their trials that are not kept in `directory`, and writes their results.
 pub(super) fn table(
     session: &Session,
     models: &[(ModelKind, Vec<ContactNetwork>)],
     directory: &Path,
+    resume: bool,
 ) -> Result<Results, Failure> {
     let config = &session.config;
     let methods = methods(&config.evaluate, models);
@@ -79,8 +89,10 @@ pub(super) fn table(
         return Err(Failure::bad_input(format!("evaluate.methods: {asked}, and none of them uses the checkpoint's {found}")));
     }
     let evaluation = Evaluation::new(config, session.info.seed, methods)?;
-    let lines = evaluation.run();
+    let (kept, there) = KeptTrials::open(directory, resume)?;
+    let lines = evaluation.run(&kept, there)?;
     let results = evaluation.results(&session.info, &lines);
     save(directory, &lines, &results)?;
+    kept.finish()?;
     Ok(results)
 }

@@ -13,12 +13,14 @@ mod object_import;
 mod ocao;
 mod plan;
 mod report;
+mod reproduce;
 mod robot;
 mod sample;
 mod scene;
 mod session;
 mod train;
 mod verify;
+mod whole_run;
 
 pub use session::{CommonOptions, Session};
 
@@ -44,6 +46,8 @@ const LONG_VERSION: &str = concat!(env!("CARGO_PKG_VERSION"), " (commit ", env!(
 enum Command {
     /// The whole loop at laptop size: explore, train, evaluate, report
     Demo(demo::DemoArguments),
+    /// The supplement's Table 1 from nothing: three Sawyers, three sticks, three orders; goes on where it was stopped
+    Reproduce(reproduce::ReproduceArguments),
     /// The catalogue of objects
     Object(object::ObjectArguments),
     /// Algorithm 1: grow a label set from demonstrations, in physics
@@ -110,6 +114,10 @@ fn execute(command: Command, command_line: &[String]) -> Result<(), Failure> {
     let session = |common: &CommonOptions| Session::start(common, command_line);
     match command {
         Command::Demo(arguments) => demo::run(&arguments, session(&arguments.common)?),
+        Command::Reproduce(arguments) => {
+            let session = Session::start_over(Some(reproduce::CONFIGURATION), &arguments.common, command_line)?;
+            reproduce::run(&arguments, session)
+        }
         Command::Object(arguments) => object::run(&arguments, &session(arguments.action.common())?),
         Command::Explore(arguments) => explore::run(&arguments, session(&arguments.common)?),
         Command::Dataset(arguments) => dataset::run(&arguments, &session(arguments.action.common())?),

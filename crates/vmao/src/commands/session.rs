@@ -61,10 +61,15 @@ pub struct Session {
 impl Session {
     /// Resolves the options; a configuration that cannot be used is bad input.
     pub fn start(options: &CommonOptions, command_line: &[String]) -> Result<Self, Failure> {
+        Self::start_over(None, options, command_line)
+    }
+
+    /// The same over one of the further shipped configurations, (name, text).
+    pub fn start_over(base: Option<(&str, &str)>, options: &CommonOptions, command_line: &[String]) -> Result<Self, Failure> {
         if options.profile {
             profile::start();
         }
-        let config = Config::load(options.config.as_deref(), &options.settings).or_bad_input()?;
+        let config = Config::load_over(base, options.config.as_deref(), &options.settings).or_bad_input()?;
         let info = RunInfo::new(command_line, options.seed, &config)?;
         let cores = || thread::available_parallelism().map_or(1, NonZeroUsize::get);
         Ok(Self {
