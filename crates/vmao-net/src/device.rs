@@ -109,7 +109,8 @@ mod cuda {
             let gradient = x.grad(&loss.backward())?;
             gradient.into_data().into_vec::<f32>().ok()
         })?;
-        if found.as_deref() == Some(&[2.0, 4.0, 0.0, 0.0, 20.0, 24.0]) {
+        // x² of rows 2, 0 and 2 has the gradient 2 x, twice for row 2; small whole numbers are exact.
+        if found.as_ref().is_some_and(|found| *found == [2.0, 4.0, 0.0, 0.0, 20.0, 24.0]) {
             return Ok(());
         }
         Err(format!("a sum on it came out as {found:?}"))

@@ -73,9 +73,12 @@ mod kernel {
         if ABSOLUTE_POS < out.len() {
             let segment = ABSOLUTE_POS / channels;
             let channel = ABSOLUTE_POS % channels;
-            let mut sum = 0.0_f32;
-            for i in starts[segment]..starts[segment + 1] {
-                sum += values[rows[i as usize] as usize * channels + channel];
+            let mut sum = f32::new(0.0);
+            let first = usize::cast_from(starts[segment]);
+            let end = usize::cast_from(starts[segment + 1]);
+            for i in first..end {
+                let row = usize::cast_from(rows[i]);
+                sum += values[row * channels + channel];
             }
             out[ABSOLUTE_POS] = sum;
         }
