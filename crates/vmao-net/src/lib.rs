@@ -12,10 +12,12 @@ mod batch;
 mod checkpoint;
 mod cloud;
 mod config;
+mod course;
 mod cvae;
 mod error;
 mod kernels;
 mod layers;
+mod lesson;
 mod network;
 #[cfg(test)]
 mod objective_checks;
@@ -23,6 +25,7 @@ mod parameters;
 mod pyramid;
 #[cfg(test)]
 mod pytorch_goldens;
+mod sealed;
 mod tape;
 mod training;
 
@@ -31,6 +34,8 @@ pub use cloud::Example;
 pub use config::{
     AbstractionConfig, AugmentationConfig, LatentPlacement, ModelKind, NetworkConfig, TrainingConfig, UpConvConfig,
 };
+pub use course::{Training, train};
 pub use error::Error;
+pub use lesson::{Lesson, Origin};
 pub use network::{ContactNetwork, EncodedScene};
-pub use training::{Elbo, EpochReport, train};
+pub use training::{Elbo, EpochReport};

@@ -33,4 +33,7 @@ pub mod run_report;
 pub mod scenes;
 pub mod sharing;
 pub mod statistics;
+pub mod tensorboard;
+pub mod training;
+pub mod training_log;
 pub use vmao_core::wording;

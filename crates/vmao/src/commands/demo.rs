@@ -6,13 +6,18 @@ use crate::{
     exploration::explore,
     failure::Failure,
     interruption::keeps,
-    learning::{load, train_all},
+    learning::load,
     output::{Layout, log, print},
     run_report::write_report,
     scenes::grasps,
+    training::{TrainingRun, go_on},
 };
+use anyhow::Context;
 use serde::Serialize;
-use std::path::{Path, PathBuf};
+use std::{
+    fs,
+    path::{Path, PathBuf},
+};
 use vmao_net::ModelKind;
 
 #[derive(Debug, clap::Args)]
@@ -43,21 +48,21 @@ pub(super) fn run(_arguments: &DemoArguments, mut session: Session) -> Result<()
         let explored = explore(config, &session.info, &writer, None)?;
         log(&format!("explored: {} of {} trials accepted", explored.successes, explored.trials));
         let records = dataset::load(&data)?;
-        let (place, config_file) = (directory.display(), directory.join("config.toml"));
-        keeps(format!(
-            "the explored data set is kept in {}, finished networks in {place}/models; go on with `vmao train` and `vmao evaluate`, each \
-             with --config {}",
-            data.display(),
-            config_file.display()
-        ));
         let mut models = Vec::new();
         for kind in ModelKind::ALL {
             if config.evaluate.methods.iter().any(|method| method.model() == kind) {
                 let place = directory.join("models").join(kind.name());
-                train_all(config, kind, &records, seed, &place)?;
+                fs::create_dir_all(&place).with_context(|| place.display().to_string())?;
+                session.save(&place)?;
+                let go_on = go_on(&directory.join("config.toml"), seed, &data, kind, &place);
+                TrainingRun { config, kind, records: &records, seed, directory: &place, go_on }.train()?;
                 models.push(load(&place, grasps(config)?)?);
             }
         }
+        let place = directory.display();
+        keeps(format!(
+            "the data set and the networks are kept in {place}; go on with `vmao evaluate --checkpoint {place}/models`"
+        ));
         let results = table(&session, &models, &directory)?;
         Ok((results, write_report(&directory)?))
     })?;
