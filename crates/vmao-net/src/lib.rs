@@ -23,6 +23,7 @@ mod parameters;
 mod pyramid;
 #[cfg(test)]
 mod pytorch_goldens;
+mod rehearsal;
 mod tape;
 mod training;
 
@@ -33,4 +34,5 @@ pub use config::{
 };
 pub use error::Error;
 pub use network::{ContactNetwork, EncodedScene};
+pub use rehearsal::Rehearsal;
 pub use training::{Elbo, EpochReport, train};

@@ -106,7 +106,7 @@ pub fn train(
     best.map(|(_, checkpoint)| checkpoint).ok_or(Error::TooFewExamples { found: 0, needed: 1 })
 }
 
-fn check_examples(examples: &[Example], network: &NetworkConfig) -> Result<(), Error> {
+pub(crate) fn check_examples(examples: &[Example], network: &NetworkConfig) -> Result<(), Error> {
     if examples.len() < 2 {
         return Err(Error::TooFewExamples { found: examples.len(), needed: 2 });
     }
@@ -141,6 +141,11 @@ impl Trainer {
         let parameters = layout.start(seed);
         let adam = Adam::new(layout.specs());
         Self { kind, network: network.clone(), training: training.clone(), seed, layout, cvae, parameters, adam, steps: 0 }
+    }
+
+    /// The network that is trained.
+    pub(crate) fn network(&self) -> &NetworkConfig {
+        &self.network
     }
 
     /// One pass over `fitted`; returns the mean terms, β and the step size.

@@ -1,0 +1,99 @@
+//! Single training steps outside of a training, for benchmarks and for comparisons with other implementations.
+
+use crate::batch::{Batch, Prepared};
+use crate::cloud::{Example, FEATURES};
+use crate::config::{ModelKind, NetworkConfig, TrainingConfig};
+use crate::error::Error;
+use crate::kernels::cross_entropy::FINGERS;
+use crate::training::{Elbo, Trainer, check_examples};
+use rayon::prelude::*;
+use safetensors::{Dtype, SafeTensorError, tensor::TensorView};
+use vmao_core::random::Stream;
+
+/// A network at its start and one batch of clouds, not augmented, to step on as often as wanted.
+#[derive(Debug)]
+pub struct Rehearsal {
+    trainer: Trainer,
+    examples: Vec<Example>,
+    batch: Batch,
+    noise: Vec<f32>,
+}
+
+impl Rehearsal {
+    /// One batch of all `examples`; the network starts, and the latent noise is drawn, from `seed`.
+    pub fn new(kind: ModelKind, network: &NetworkConfig, examples: Vec<Example>, seed: u64) -> Result<Self, Error> {
+        network.validate()?;
+        check_examples(&examples, network)?;
+        let trainer = Trainer::new(kind, network, &TrainingConfig::small(), seed);
+        let batch = batch(&examples, network);
+        let mut stream = Stream::new(seed, &[LABEL_NOISE]);
+        let noise = (0..examples.len() * trainer.cvae.latent_size()).map(|_| stream.normal() as f32).collect();
+        Ok(Self { trainer, examples, batch, noise })
+    }
+
+    /// Orders the clouds and finds all neighbours again.
+    pub fn search(&mut self) {
+        self.batch = batch(&self.examples, self.trainer.network());
+    }
+
+    /// Forward, backward, one step of Adam; returns the terms before it. Fails where a number is not finite.
+    pub fn step(&mut self, learning_rate: f32) -> Result<Elbo, Error> {
+        let beta = self.trainer.network().beta;
+        let refuse = |(what, value)| Error::Diverged { what, value, step: 0, epoch: 1, batch: 1 };
+        self.trainer.step(&self.batch, self.noise.clone(), beta, learning_rate).map_err(refuse)
+    }
+
+    /// The batch as another implementation needs it to take the same step, a safetensors file.
+    ///
+    /// `features`, `posterior_features`, `map_means`, `targets`, `noise`; for level i `down.i.sources`, `down.i.offsets` and `up.i.…`
+    /// (rows of the whole batch, offsets in the layer's unit, all neighbours of a centre one after the other); `weight.NAME` of every
+    /// trained array. Clouds lie one after the other and have the same size if the examples do.
+    pub fn to_safetensors(&self) -> Result<Vec<u8>, Error> {
+        let mut arrays: Vec<(String, Dtype, Vec<usize>, Vec<u8>)> = Vec::new();
+        let mut add = |name: String, columns: usize, values: &[f32]| {
+            let bytes = values.iter().flat_map(|x| x.to_le_bytes()).collect();
+            arrays.push((name, Dtype::F32, vec![values.len() / columns, columns], bytes));
+        };
+        let batch = &self.batch;
+        add("features".to_owned(), FEATURES, &batch.features);
+        add("posterior_features".to_owned(), FEATURES + FINGERS, &batch.posterior_features);
+        add("map_means".to_owned(), 3 * FINGERS, &batch.map_means);
+        add("targets".to_owned(), FINGERS, &batch.targets);
+        add("noise".to_owned(), self.trainer.cvae.latent_size().max(1), &self.noise);
+        for (values, spec) in self.trainer.parameters.values.iter().zip(self.trainer.layout.specs()) {
+            if spec.is_trained() {
+                add(format!("weight.{}", spec.name), spec.shape[1], values);
+            }
+        }
+        for (flow, layers) in [("down", &batch.down), ("up", &batch.up)] {
+            for (i, edges) in layers.iter().enumerate() {
+                add(format!("{flow}.{i}.offsets"), 3, &edges.offsets);
+            }
+        }
+        for (flow, layers) in [("down", &batch.down), ("up", &batch.up)] {
+            for (i, edges) in layers.iter().enumerate() {
+                let bytes = edges.picks.sources.iter().flat_map(|&s| (s as i32).to_le_bytes()).collect();
+                arrays.push((format!("{flow}.{i}.sources"), Dtype::I32, vec![edges.picks.sources.len()], bytes));
+            }
+        }
+        let refuse = |error: SafeTensorError| Error::NotSafetensors { bytes: 0, reason: error.to_string() };
+        let views = arrays.iter().map(|(name, dtype, shape, bytes)| Ok((name, TensorView::new(*dtype, shape.clone(), bytes)?)));
+        let views = views.collect::<Result<Vec<_>, _>>().map_err(refuse)?;
+        safetensors::serialize(views, None).map_err(refuse)
+    }
+
+    /// The network as it is now.
+    pub fn checkpoint(&self) -> crate::Checkpoint {
+        self.trainer.checkpoint(0, None)
+    }
+}
+
+/// Stream label of the latent noise.
+const LABEL_NOISE: u64 = 6;
+
+fn batch(examples: &[Example], network: &NetworkConfig) -> Batch {
+    let prepare = |(i, example)| Prepared::new(example, network, &mut Stream::new(0, &[i as u64]));
+    let prepared: Vec<Prepared> = examples.par_iter().enumerate().map(prepare).collect();
+    let members: Vec<_> = prepared.iter().map(|p| (p, p.cloud.clone())).collect();
+    Batch::new(&members, network)
+}
