@@ -1,7 +1,7 @@
 //! Times training steps and sampled maps of one network; driven by `benches/peers/network.py`.
 //!
-//! `network_step DIR CLOUDS THREADS STEPS export|step|search|map`: DIR holds `network.json`. `export` writes the batch as DIR/batch.safetensors and
-//! the trained network's maps; the others print CPU seconds and wall seconds of each of STEPS repetitions, losses, and peak memory.
+//! `network_step DIR CLOUDS THREADS STEPS export|step|search|map`: DIR holds `network.json`. `export` writes the batch as DIR/batch.safetensors a network
+//! after three steps as DIR/warmed.safetensors and its map as DIR/map.json; the others print CPU seconds and wall seconds of each of STEPS repetitions, losses, and peak memory.
 
 #![expect(clippy::print_stdout, reason = "an example prints its measurement")]
 
@@ -19,6 +19,8 @@ use vmao_net::{ContactNetwork, Example, ModelKind, NetworkConfig, Rehearsal};
 const SCENE: usize = 1020;
 const LEARNING_RATE: f32 = 1e-3;
 const SEED: u64 = 0;
+/// Every number of the latent code of sampled maps.
+const LATENT: f32 = 0.5;
 
 fn main() -> Result<(), Box<dyn Error>> {
     let arguments: Vec<String> = std::env::args().collect();
@@ -61,8 +63,8 @@ fn export(folder: &Path, network: &NetworkConfig, examples: Vec<Example>) -> Res
     let warmed = warmed(network, &examples)?;
     fs::write(folder.join("warmed.safetensors"), warmed.checkpoint().to_safetensors()?)?;
     let contacts = ContactNetwork::load(&warmed.checkpoint());
-    let map = contacts.map(&examples[0].points, &examples[0].colors, &vec![0.5; network.latent_size])?;
-    fs::write(folder.join("cloud.json"), serde_json::to_vec(&(&examples[0].points, &examples[0].colors, &map.fingers))?)?;
+    let map = contacts.map(&examples[0].points, &examples[0].colors, &vec![LATENT; network.latent_size])?;
+    fs::write(folder.join("map.json"), serde_json::to_vec(&map.fingers)?)?;
     Ok(())
 }
 
@@ -79,21 +81,18 @@ fn train(network: &NetworkConfig, examples: Vec<Example>, steps: usize, search: 
     report(&times, &losses.iter().map(|terms| terms.reconstruction + network.beta * terms.kl).collect::<Vec<f32>>())
 }
 
+/// From the listed cloud to the map; with its neighbours given; and another code on an encoded cloud.
 fn sample(network: &NetworkConfig, examples: Vec<Example>, steps: usize) -> Result<(), Box<dyn Error>> {
-    let contacts = ContactNetwork::load(&warmed(network, &examples)?.checkpoint());
-    let mut whole = || contacts.map(&examples[0].points, &examples[0].colors, &vec![0.5; network.latent_size]);
-    let first = whole()?;
-    let times = timed(steps, || {
-        whole()?;
-        Ok(())
-    })?;
+    let warmed = warmed(network, &examples)?;
+    let contacts = ContactNetwork::load(&warmed.checkpoint());
+    let latent = vec![LATENT; network.latent_size];
+    let whole = || Ok(drop(contacts.map(&examples[0].points, &examples[0].colors, &latent)?));
+    let given = || Ok(drop(contacts.decode(&warmed.encode(&contacts, 0), &latent)?));
     let scene = contacts.encode(&examples[0].points, &examples[0].colors)?;
-    let codes = timed(steps, || {
-        contacts.decode(&scene, &vec![0.5; network.latent_size])?;
-        Ok(())
-    })?;
-    let peak = first.fingers[0].iter().fold(0.0_f32, |a, &b| a.max(b));
-    println!("{}", serde_json::json!({"whole": times, "code": codes, "peak": peak, "vm_hwm_kib": memory("VmHWM:")?}));
+    let code = || Ok(drop(contacts.decode(&scene, &latent)?));
+    whole()?;
+    let (whole, given, code) = (timed(steps, whole)?, timed(steps, given)?, timed(steps, code)?);
+    println!("{}", serde_json::json!({"whole": whole, "given": given, "code": code, "vm_hwm_kib": memory("VmHWM:")?}));
     Ok(())
 }
 

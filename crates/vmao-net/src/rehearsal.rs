@@ -1,10 +1,12 @@
 //! Single training steps outside of a training, for benchmarks and for comparisons with other implementations.
 
 use crate::batch::{Batch, Prepared};
+use crate::checkpoint::Checkpoint;
 use crate::cloud::{Example, FEATURES};
 use crate::config::{ModelKind, NetworkConfig, TrainingConfig};
 use crate::error::Error;
 use crate::kernels::cross_entropy::FINGERS;
+use crate::network::{ContactNetwork, EncodedScene};
 use crate::training::{Elbo, Trainer, check_examples};
 use rayon::prelude::*;
 use safetensors::{Dtype, SafeTensorError, tensor::TensorView};
@@ -15,6 +17,7 @@ use vmao_core::random::Stream;
 pub struct Rehearsal {
     trainer: Trainer,
     examples: Vec<Example>,
+    prepared: Vec<Prepared>,
     batch: Batch,
     noise: Vec<f32>,
 }
@@ -25,15 +28,15 @@ impl Rehearsal {
         network.validate()?;
         check_examples(&examples, network)?;
         let trainer = Trainer::new(kind, network, &TrainingConfig::small(), seed);
-        let batch = batch(&examples, network);
+        let (prepared, batch) = ready(&examples, network);
         let mut stream = Stream::new(seed, &[LABEL_NOISE]);
         let noise = (0..examples.len() * trainer.cvae.latent_size()).map(|_| stream.normal() as f32).collect();
-        Ok(Self { trainer, examples, batch, noise })
+        Ok(Self { trainer, examples, prepared, batch, noise })
     }
 
     /// Orders the clouds and finds all neighbours again.
     pub fn search(&mut self) {
-        self.batch = batch(&self.examples, self.trainer.network());
+        (self.prepared, self.batch) = ready(&self.examples, self.trainer.network());
     }
 
     /// Forward, backward, one step of Adam; returns the terms before it. Fails where a number is not finite.
@@ -43,9 +46,14 @@ impl Rehearsal {
         self.trainer.step(&self.batch, self.noise.clone(), beta, learning_rate).map_err(refuse)
     }
 
+    /// Example `index` through the scene encoder, its neighbours as they were found before.
+    pub fn encode(&self, network: &ContactNetwork, index: usize) -> EncodedScene {
+        network.encode_prepared(&self.prepared[index])
+    }
+
     /// The batch as another implementation needs it to take the same step, a safetensors file.
     ///
-    /// `features`, `posterior_features`, `map_means`, `targets`, `noise`; for level i `down.i.sources`, `down.i.offsets` and `up.i.…`
+    /// `points` (world, as listed), `order` (farthest-point order of each cloud), and in that order `features`, `posterior_features`, `map_means`, `targets`, `noise`; for level i `down.i.sources`, `down.i.offsets` and `up.i.…`
     /// (rows of the whole batch, offsets in the layer's unit, all neighbours of a centre one after the other); `weight.NAME` of every
     /// trained array. Clouds lie one after the other and have the same size if the examples do.
     pub fn to_safetensors(&self) -> Result<Vec<u8>, Error> {
@@ -55,6 +63,8 @@ impl Rehearsal {
             arrays.push((name, Dtype::F32, vec![values.len() / columns, columns], bytes));
         };
         let batch = &self.batch;
+        let points: Vec<f32> = self.examples.iter().flat_map(|e| e.points.iter().flatten().copied()).collect();
+        add("points".to_owned(), 3, &points);
         add("features".to_owned(), FEATURES, &batch.features);
         add("posterior_features".to_owned(), FEATURES + FINGERS, &batch.posterior_features);
         add("map_means".to_owned(), 3 * FINGERS, &batch.map_means);
@@ -70,10 +80,14 @@ impl Rehearsal {
                 add(format!("{flow}.{i}.offsets"), 3, &edges.offsets);
             }
         }
+        let mut add = |name: String, values: &[u32]| {
+            let bytes = values.iter().flat_map(|&x| (x as i32).to_le_bytes()).collect();
+            arrays.push((name, Dtype::I32, vec![values.len()], bytes));
+        };
+        add("order".to_owned(), &self.prepared.iter().flat_map(|p| p.pyramid.order.iter().copied()).collect::<Vec<u32>>());
         for (flow, layers) in [("down", &batch.down), ("up", &batch.up)] {
             for (i, edges) in layers.iter().enumerate() {
-                let bytes = edges.picks.sources.iter().flat_map(|&s| (s as i32).to_le_bytes()).collect();
-                arrays.push((format!("{flow}.{i}.sources"), Dtype::I32, vec![edges.picks.sources.len()], bytes));
+                add(format!("{flow}.{i}.sources"), &edges.picks.sources);
             }
         }
         let refuse = |error: SafeTensorError| Error::NotSafetensors { bytes: 0, reason: error.to_string() };
@@ -83,7 +97,7 @@ impl Rehearsal {
     }
 
     /// The network as it is now.
-    pub fn checkpoint(&self) -> crate::Checkpoint {
+    pub fn checkpoint(&self) -> Checkpoint {
         self.trainer.checkpoint(0, None)
     }
 }
@@ -91,9 +105,10 @@ impl Rehearsal {
 /// Stream label of the latent noise.
 const LABEL_NOISE: u64 = 6;
 
-fn batch(examples: &[Example], network: &NetworkConfig) -> Batch {
+fn ready(examples: &[Example], network: &NetworkConfig) -> (Vec<Prepared>, Batch) {
     let prepare = |(i, example)| Prepared::new(example, network, &mut Stream::new(0, &[i as u64]));
     let prepared: Vec<Prepared> = examples.par_iter().enumerate().map(prepare).collect();
     let members: Vec<_> = prepared.iter().map(|p| (p, p.cloud.clone())).collect();
-    Batch::new(&members, network)
+    let batch = Batch::new(&members, network);
+    (prepared, batch)
 }
