@@ -230,7 +230,9 @@ def compare(name, config, rounds, program):
         for side, task in turns:
             turns[side, task].append(run(sides[side](task)))
     losses = [turns[side, "step"][0]["losses"] for side in sides]
-    worst = max(abs(a - b) / abs(a) for other in losses[1:] for a, b in zip(losses[0], other))
+    # Only the first is of the same weights: Adam's first step goes by the signs of gradients, even of those that are mere rounding.
+    worst = max(abs(losses[0][0] - other[0]) / losses[0][0] for other in losses[1:])
+    assert all(side[-1] < side[0] for side in losses), f"a side does not learn: {losses}"
     maps = max(turns[side, "map"][0]["difference"] for side in list(sides)[1:])
     same = min(turns[side, "search"][0]["same"] for side in list(sides)[1:])
     assert worst < 1e-4 and maps < 1e-3 and same > 0.99, f"losses differ by {worst}, maps by {maps}, {same} of the neighbours are the same"
@@ -243,7 +245,7 @@ def compare(name, config, rounds, program):
         "map, another code": ("map", "code"),
     }
     for title, (task, key) in tasks.items():
-        cell = lambda side, which: peer.median([t[which] for turn in turns[side, task] for t in turn[key]])
+        cell = lambda side, which: min(t[which] for turn in turns[side, task] for t in turn[key])
         figures = {side: (cell(side, 0), cell(side, 1), peer.median([t["vm_hwm_kib"] for t in turns[side, task]]) / 1024) for side in sides}
         best = min(list(sides)[1:], key=lambda side: figures[side][0])
         for side, (cpu, wall, peak) in figures.items():
@@ -251,7 +253,7 @@ def compare(name, config, rounds, program):
             ratios = [f"{cpu / own[0]:.2f}", f"{wall / own[1]:.2f}", f"{peak / own[2]:.2f}"]
             rows.append([title, side + (" (best)" if side == best else ""), f"{cpu * 1e3:.1f}", f"{wall * 1e3:.1f}", f"{peak:.0f}", *ratios])
     start = turns["PyTorch, rows", "step"][0]["start_kib"] / 1024
-    print(f"\n{name}: {config['points']} points, {CLOUDS} clouds a step; first losses {losses[0][0]:.6f}, largest difference {worst:.1e}; maps differ")
+    print(f"\n{name}: {config['points']} points, {CLOUDS} clouds a step; loss {losses[0][0]:.6f}, relative difference {worst:.1e}; maps differ")
     print(f"by {maps:.1e} of their largest value; {same:.2%} of the neighbours are the same; PyTorch alone takes {start:.0f} MiB.\n")
     peer.table(["task", "side", "CPU ms", "wall ms", "peak MiB", "CPU / ours", "wall / ours", "peak / ours"], rows)
 
@@ -263,7 +265,7 @@ if __name__ == "__main__":
     else:
         rounds = int(sys.argv[1]) if len(sys.argv) > 1 else 3
         built = peer.cargo("vmao-net", "example", "network_step")
-        print(f"CPU time and wall time: medians of {rounds} turns of {STEPS} repetitions, {os.cpu_count()} cores, torch {torch.__version__}.")
+        print(f"CPU time and wall time: least of {rounds} turns of {STEPS} repetitions, {os.cpu_count()} cores, torch {torch.__version__}.")
         compare("demo", layered([]), rounds, built)
         for path in sys.argv[2:]:
             compare(os.path.basename(path).removesuffix(".toml"), layered([path]), rounds, built)

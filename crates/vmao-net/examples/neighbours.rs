@@ -1,7 +1,7 @@
 //! Times farthest-point sampling and neighbour searches; driven by `benches/peers/neighbours.py`.
 //!
-//! `neighbours REPEATS < REQUEST`: REQUEST is `{"points", "queries", "radius", "nearest", "samples"}`; prints CPU seconds of one repetition and the
-//! answers of each search, on one thread.
+//! `neighbours REPEATS < REQUEST`: REQUEST is `{"points", "queries", "radius", "nearest", "samples"}`; prints CPU seconds of one
+//! repetition and the answers of each search, on one thread.
 
 #![expect(clippy::print_stdout, reason = "an example prints its measurement")]
 

@@ -112,3 +112,44 @@ fn ready(examples: &[Example], network: &NetworkConfig) -> (Vec<Prepared>, Batch
     let batch = Batch::new(&members, network);
     (prepared, batch)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use safetensors::SafeTensors;
+
+    fn example(index: u64) -> Example {
+        let mut s = Stream::new(3, &[index]);
+        let points: Vec<[f32; 3]> = (0..230).map(|_| std::array::from_fn(|_| s.range(0.0, 0.1) as f32)).collect();
+        let colors = vec![[0.5, 0.25, 0.75]; points.len()];
+        let contacts = [points[3], points[90]];
+        Example { points, colors, contacts }
+    }
+
+    #[test]
+    fn a_search_finds_the_same_batch_and_steps_go_downhill() {
+        let network = NetworkConfig::small();
+        let mut rehearsal = Rehearsal::new(ModelKind::Vmao, &network, vec![example(0), example(1)], 5).unwrap();
+        let before = rehearsal.to_safetensors().unwrap();
+        rehearsal.search();
+        assert_eq!(before, rehearsal.to_safetensors().unwrap());
+        let first = rehearsal.step(1e-3).unwrap();
+        let later = (0..5).map(|_| rehearsal.step(1e-3).unwrap()).last().unwrap();
+        assert!(later.reconstruction < first.reconstruction, "{first:?} {later:?}");
+        assert_ne!(before, rehearsal.to_safetensors().unwrap(), "the weights moved");
+    }
+
+    #[test]
+    fn the_batch_names_every_neighbour_by_its_row() {
+        let network = NetworkConfig::small();
+        let rehearsal = Rehearsal::new(ModelKind::Vmao, &network, vec![example(0), example(1)], 5).unwrap();
+        let bytes = rehearsal.to_safetensors().unwrap();
+        let file = SafeTensors::deserialize(&bytes).unwrap();
+        assert_eq!(file.tensor("features").unwrap().shape(), [460, 9]);
+        let sources = file.tensor("down.0.sources").unwrap();
+        let rows: Vec<i32> = sources.data().as_chunks::<4>().0.iter().map(|b| i32::from_le_bytes(*b)).collect();
+        assert_eq!(rows.len(), 2 * 192 * 16);
+        let (first, second) = rows.split_at(192 * 16);
+        assert!(first.iter().all(|r| (0..230).contains(r)) && second.iter().all(|r| (230..460).contains(r)));
+    }
+}

@@ -61,6 +61,7 @@ fn fill(row: &mut [u32], columns: &Columns, centre: [f32; 3], radius: f32) -> us
 #[cfg(test)]
 mod tests {
     use super::*;
+    use vmao_core::random::Stream;
 
     #[test]
     fn rows_hold_the_first_within_reach_and_repeat_the_first() {
@@ -68,5 +69,23 @@ mod tests {
         let found = ball_query(&points, &[[0.0, 0.0, 0.0], [0.10, 0.0, 0.0], [0.5, 0.0, 0.0]], 0.0201, 3);
         assert_eq!(found, vec![0, 2, 3, 4, 4, 4, 4, 4, 4]);
         assert_eq!(ball_query(&points, &[[0.02, 0.0, 0.0]], 0.0201, 2), vec![0, 1], "the order of the points, not the nearest");
+    }
+
+    #[test]
+    fn it_agrees_with_looking_at_every_point() {
+        let mut stream = Stream::new(5, &[]);
+        let mut cloud = |n| (0..n).map(|_| std::array::from_fn(|_| stream.unit() as f32)).collect::<Vec<[f32; 3]>>();
+        let (points, centres) = (cloud(331), cloud(150));
+        let found = ball_query(&points, &centres, 0.2, 7);
+        let (mut full, mut empty) = (0, 0);
+        for (&centre, row) in centres.iter().zip(found.chunks(7)) {
+            let inside: Vec<u32> = (0..331).filter(|&i| squared_distance(points[i as usize], centre) <= 0.2 * 0.2).collect();
+            full += usize::from(inside.len() > 7);
+            empty += usize::from(inside.is_empty());
+            let Some(&first) = inside.first() else { continue };
+            let expected: Vec<u32> = inside.iter().copied().chain(std::iter::repeat(first)).take(7).collect();
+            assert_eq!(row, expected);
+        }
+        assert!(full > 5 && empty < 75, "{full} full and {empty} empty balls test little");
     }
 }

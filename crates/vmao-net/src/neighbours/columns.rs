@@ -25,10 +25,10 @@ impl Columns {
         Self { x: axis(0), y: axis(1), z: axis(2) }
     }
 
-    /// Calls `near` with the first index of every group that has a point closer than the bound that `near` returned last (m²), and
-    /// with the squared distances of that group; stops where the bound becomes negative.
+    /// Calls `near` with the first index and the squared distances of every group that has a point closer than the bound.
     ///
-    /// Rounds as [`super::squared_distance`] does. Inline, because callers compile it for the vectors that the processor has.
+    /// The bound (m²) is what `near` returned last; where it becomes negative the scan stops. Rounds as
+    /// [`super::squared_distance`] does. Inline, because callers compile it for the vectors that the processor has.
     #[inline(always)]
     pub(crate) fn scan(&self, centre: [f32; 3], mut bound: f32, mut near: impl FnMut(usize, &[f32; LANES]) -> f32) {
         let groups = self.x.iter().zip(&self.y).zip(&self.z);
