@@ -11,13 +11,16 @@ by torch's autograd. The Rust tests (src/pytorch_goldens.rs) read configuration,
 
 import json
 import pathlib
+import sys
 
 import numpy as np
 import safetensors.torch
 import torch
 
+from pytorch_network import Batch, Network, shapes
+
 torch.set_default_dtype(torch.float64)
-HERE = pathlib.Path(__file__).parent
+FOLDER = pathlib.Path(sys.argv[1]) if len(sys.argv) > 1 else pathlib.Path(__file__).parent
 
 # No two sizes are equal, so that no transposed or misplaced array can pass.
 NETWORK = {
@@ -44,9 +47,6 @@ NETWORK = {
     "position_unit": 0.05,
 }
 CLOUD_SIZES = [83, 71]
-CONTEXT = 4  # modulators of the last layer that the scene sets
-EPSILON = 1e-5
-
 
 def squared_distances(a, b):
     return ((a[:, None] - b[None]) ** 2).sum(-1)
@@ -121,131 +121,34 @@ def prepare(points, colors, contacts, config):
     }
 
 
-def shapes(kind, config):
-    """Every array of the network by name, and the function that starts it."""
-    found = {}
+def batch(clouds, config):
+    """The clouds one after the other; neighbours become row numbers of the whole batch."""
+    levels = range(len(config["abstraction"]))
+    counts = [[len(c["placed"]) for c in clouds]]
+    counts += [[level["num_centroids"]] * len(clouds) for level in config["abstraction"]]
 
-    def norm_linear(name, inputs, channels):
-        found[f"{name}.weight"] = (inputs, channels)
-        found[f"{name}.norm.weight"] = (channels,)
-        found[f"{name}.norm.bias"] = (channels,)
-        return channels
+    def edges(key, level, centres, sources):
+        unit = min(config["abstraction"][level]["radius"], 0.15)
+        rows, offsets, base = [], [], 0
+        for b, cloud in enumerate(clouds):
+            near = torch.tensor(cloud[key][level])
+            points = cloud["placed"]
+            rows.append((near + base).ravel())
+            offsets.append(((points[near] - points[: counts[centres][b], None]) / unit).flatten(0, 1))
+            base += counts[sources][b]
+        return torch.cat(rows), torch.cat(offsets), clouds[0][key][level].shape[1]
 
-    def encoder(name, inputs):
-        widths = []
-        for i, level in enumerate(config["abstraction"]):
-            inputs += 3
-            for j, channels in enumerate(level["channels"]):
-                inputs = norm_linear(f"{name}.abstraction.{i}.mlp.{j}", inputs, channels)
-            widths.append(inputs)
-        return widths
-
-    widths = encoder("scene", 9)
-    latent = config["latent_size"] if kind == "vmao" else 0
-    if latent:
-        encoder("posterior", 11)
-        for name in ["posterior.mean", "posterior.log_variance"]:
-            found[f"{name}.weight"], found[f"{name}.bias"] = (widths[-1] + 6, latent), (latent,)
-    coarse = widths[-1] + latent
-    for i, layer in enumerate(config["up_conv"]):
-        inputs = coarse + 3
-        for j, channels in enumerate(layer["channels"]):
-            inputs = norm_linear(f"decoder.up_conv.{i}.mlp.{j}", inputs, channels)
-        inputs += ([9] + widths)[len(widths) - 1 - i] + (latent if config["latent_placement"] == "every_level" else 0)
-        for j, channels in enumerate(layer["refine"]):
-            inputs = norm_linear(f"decoder.up_conv.{i}.refine.{j}", inputs, channels)
-        coarse = inputs
-    norm_linear("decoder.head", coarse, config["head"])
-    found["decoder.context.weight"], found["decoder.context.bias"] = (widths[-1], CONTEXT), (CONTEXT,)
-    found["decoder.logits.weight"] = ((1 + latent + CONTEXT) * config["head"], 2)
-    found["decoder.logits.bias"] = (2,)
-    return found
-
-
-class Objective:
-    """The network in plain tensor operations; a list of tensors is one tensor a cloud."""
-
-    def __init__(self, kind, config, weights):
-        self.kind, self.config, self.weights = kind, config, weights
-
-    def norm_linear(self, name, rows):
-        z = rows @ self.weights[f"{name}.weight"]
-        z = torch.nn.functional.batch_norm(
-            z, None, None, self.weights[f"{name}.norm.weight"], self.weights[f"{name}.norm.bias"], training=True, eps=EPSILON
-        )
-        return torch.relu(z)
-
-    def grouped(self, name, depth, sources, source_points, centre_points, neighbours, unit):
-        """[offset, feature] of each neighbour → shared perceptron over the whole batch → maximum over the neighbours."""
-        rows = []
-        for x, p, c, n in zip(sources, source_points, centre_points, neighbours):
-            n = torch.tensor(n)
-            rows.append(torch.cat([(p[n] - c[:, None]) / unit, x[n]], 2).flatten(0, 1))
-        y = torch.cat(rows)
-        for j in range(depth):
-            y = self.norm_linear(f"{name}.{j}", y)
-        pooled = y.unflatten(0, (-1, neighbours[0].shape[1])).amax(1)
-        return list(pooled.split([len(c) for c in centre_points]))
-
-    def encode(self, name, clouds, features):
-        levels, x = [], features
-        points = [c["placed"] for c in clouds]
-        for i, level in enumerate(self.config["abstraction"]):
-            centres = [p[: level["num_centroids"]] for p in points]
-            balls = [c["balls"][i] for c in clouds]
-            unit = min(level["radius"], 0.15)
-            x = self.grouped(f"{name}.abstraction.{i}.mlp", len(level["channels"]), x, points, centres, balls, unit)
-            levels.append(x)
-            points = centres
-        return levels
-
-    def terms(self, clouds, noise):
-        config, w = self.config, self.weights
-        features = [c["features"] for c in clouds]
-        scene = self.encode("scene", clouds, features)
-        top = torch.stack([x.amax(0) for x in scene[-1]])
-        modulators = [top @ w["decoder.context.weight"] + w["decoder.context.bias"]]
-        coarse, kl, z = scene[-1], None, None
-        if self.kind == "vmao":
-            rows = [torch.cat([c["features"], c["maps"] / c["maps"].amax(0)], 1) for c in clouds]
-            read = torch.stack([x.amax(0) for x in self.encode("posterior", clouds, rows)[-1]])
-            read = torch.cat([read, torch.stack([c["means"] for c in clouds])], 1)
-            mean = read @ w["posterior.mean.weight"] + w["posterior.mean.bias"]
-            log_variance = (read @ w["posterior.log_variance.weight"] + w["posterior.log_variance.bias"]).clamp(-10, 10)
-            posterior = torch.distributions.Normal(mean, (0.5 * log_variance).exp())
-            prior = torch.distributions.Normal(torch.zeros_like(mean), torch.ones_like(mean))
-            kl = torch.distributions.kl_divergence(posterior, prior).sum() / len(clouds)
-            z = mean + (0.5 * log_variance).exp() * noise
-            modulators.append(z)
-            coarse = [torch.cat([x, z[b].expand(len(x), -1)], 1) for b, x in enumerate(coarse)]
-        counts = [None] + [level["num_centroids"] for level in config["abstraction"]]
-        for i, layer in enumerate(config["up_conv"]):
-            fine = len(scene) - 1 - i
-            points = [c["placed"][: counts[fine]] for c in clouds]
-            sources = [c["placed"][: counts[fine + 1]] for c in clouds]
-            unit = min(config["abstraction"][fine]["radius"], 0.15)
-            nearest = [c["nearest"][fine] for c in clouds]
-            y = self.grouped(f"decoder.up_conv.{i}.mlp", len(layer["channels"]), coarse, sources, points, nearest, unit)
-            skip = scene[fine - 1] if fine > 0 else features
-            rows = []
-            for b in range(len(clouds)):
-                parts = [y[b], skip[b]]
-                if z is not None and config["latent_placement"] == "every_level":
-                    parts.append(z[b].expand(len(y[b]), -1))
-                rows.append(torch.cat(parts, 1))
-            x = torch.cat(rows)
-            for j in range(len(layer["refine"])):
-                x = self.norm_linear(f"decoder.up_conv.{i}.refine.{j}", x)
-            coarse = list(x.split([len(p) for p in points]))
-        sizes = [len(x) for x in coarse]
-        hidden = self.norm_linear("decoder.head", torch.cat(coarse)).split(sizes)
-        bank = w["decoder.logits.weight"].unflatten(0, (-1, config["head"]))
-        logits, loss = [], 0.0
-        for h, m, cloud in zip(hidden, torch.cat(modulators, 1), clouds):
-            own = bank[0] + torch.einsum("m,mhc->hc", m, bank[1:])
-            logits.append(h @ own + w["decoder.logits.bias"])
-            loss = loss - (cloud["maps"] * torch.log_softmax(logits[-1], 0)).sum() / (2 * len(clouds))
-        return loss, kl, logits
+    return Batch(
+        len(clouds),
+        torch.cat([c["features"] for c in clouds]),
+        torch.cat([torch.cat([c["features"], c["maps"] / c["maps"].amax(0)], 1) for c in clouds]),
+        torch.stack([c["means"] for c in clouds]),
+        torch.cat([c["maps"] for c in clouds]),
+        [edges("balls", i, i + 1, i) for i in levels],
+        [edges("nearest", i, i, i + 1) for i in levels],
+        counts[0],
+        [torch.repeat_interleave(torch.arange(len(clouds)), torch.tensor(count)) for count in counts],
+    )
 
 
 def mint(name, kind, config, seed):
@@ -272,7 +175,7 @@ def mint(name, kind, config, seed):
         weights[array] = torch.tensor((start + scale * rng.standard_normal(shape)).astype(np.float32))
     tensors |= {f"weight.{array}": value for array, value in weights.items()}
     weights = {array: value.double().requires_grad_() for array, value in weights.items()}
-    loss, kl, logits = Objective(kind, config, weights).terms(clouds, noise.double())
+    loss, kl, logits = Network(kind, config, weights).terms(batch(clouds, config), noise.double())
     (loss if kl is None else loss + config["beta"] * kl).backward()
     tensors |= {f"gradient.{array}": value.grad.float() for array, value in weights.items()}
     tensors |= {f"cloud.{b}.logits": y.detach().float() for b, y in enumerate(logits)}
@@ -281,7 +184,7 @@ def mint(name, kind, config, seed):
     versions = f"torch {torch.__version__.split('+')[0]}, numpy {np.__version__}"
     metadata = {"kind": kind, "network": json.dumps(config), "versions": versions}
     tensors = {key: value.contiguous() for key, value in tensors.items()}
-    safetensors.torch.save_file(tensors, HERE / f"{name}.safetensors", metadata)
+    safetensors.torch.save_file(tensors, FOLDER / f"{name}.safetensors", metadata)
     print(f"{name}: reconstruction {loss.item():.6f}, kl {0.0 if kl is None else kl.item():.6f}, {versions}")
 
 

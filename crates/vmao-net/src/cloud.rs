@@ -2,8 +2,11 @@
 
 use crate::config::NetworkConfig;
 use crate::error::Error;
+use crate::kernels::blocks::vectorised;
 use crate::kernels::cross_entropy::FINGERS;
+use crate::neighbours::columns::Columns;
 use crate::neighbours::squared_distance;
+use rayon::prelude::*;
 
 /// Numbers per point that the scene encoder reads: centred position, colour, outward offset.
 pub(crate) const FEATURES: usize = 9;
@@ -118,16 +121,35 @@ fn geometric_median(points: &[[f64; 3]]) -> [f64; 2] {
 ///
 /// Opposite sides of a handle differ in little else; without it a network takes long to tell the two fingers' sides apart.
 pub(crate) fn outward(points: &[[f32; 3]], radius: f32) -> Vec<[f32; 3]> {
+    let columns = Columns::new(points);
+    let bound = (radius * radius).next_up();
     let one = |&point: &[f32; 3]| {
         let mut sums = [0.0_f64; 4];
-        for &other in points.iter().filter(|&&other| squared_distance(point, other) <= radius * radius) {
-            (0..3).for_each(|axis| sums[axis] += f64::from(point[axis]) - f64::from(other[axis]));
-            sums[3] += 1.0;
-        }
+        vectorised(
+            #[inline(always)]
+            || {
+                columns.scan(
+                    point,
+                    bound,
+                    #[inline(always)]
+                    |start, gaps| {
+                        for (lane, _) in gaps.iter().enumerate().filter(|&(_, &gap)| gap < bound) {
+                            let other = points[start + lane];
+                            (0..3).for_each(|axis| sums[axis] += f64::from(point[axis]) - f64::from(other[axis]));
+                            sums[3] += 1.0;
+                        }
+                        bound
+                    },
+                );
+            },
+        );
         [0, 1, 2].map(|axis| (sums[axis] / (sums[3] * f64::from(radius))) as f32)
     };
-    points.iter().map(one).collect()
+    points.par_iter().with_min_len(OUTWARD_TASK).map(one).collect()
 }
+
+/// Points that one task of [`outward`] works on.
+const OUTWARD_TASK: usize = 128;
 
 /// Rows [x, y, z, r, g, b, outward offset] of a cloud in its frame, positions in `position_unit`, colours about zero.
 pub(crate) fn features(points: &[[f32; 3]], colors: &[[f32; 3]], outward: &[[f32; 3]], config: &NetworkConfig) -> Vec<f32> {

@@ -28,6 +28,7 @@ mod parameters;
 mod pyramid;
 #[cfg(test)]
 mod pytorch_goldens;
+mod rehearsal;
 mod sealed;
 mod training;
 
@@ -41,4 +42,5 @@ pub use device::Device;
 pub use error::Error;
 pub use lesson::{Lesson, Origin};
 pub use network::{ContactNetwork, EncodedScene};
+pub use rehearsal::Rehearsal;
 pub use training::{Elbo, EpochReport};

@@ -3,7 +3,7 @@
 //! A grouped row is [offset, feature of the source]; its product with W = [W_o; W_f] is offset·W_o + (F W_f)[source], so the
 //! large product runs once per source instead of once per neighbour.
 
-use super::blocks::{BLOCK, add_in_order, narrow};
+use super::blocks::{BLOCK, add_in_order, narrow, vectorised};
 use super::gather::Picks;
 use super::linear::{linear, linear_backward};
 use super::norm::{Gradient, Moments, Tape, accumulate};
@@ -23,11 +23,16 @@ pub(crate) fn add_offsets(z: &mut [f32], offsets: &[f32], weight: &[f32], channe
     let (wx, rest) = weight.split_at(channels);
     let (wy, rest) = rest.split_at(channels);
     let (wx, wy, wz) = (&wx[..channels], &wy[..channels], &rest[..channels]);
-    for (z, o) in z.chunks_exact_mut(channels).zip(offsets.chunks_exact(3)) {
-        for c in 0..channels {
-            z[c] += o[0] * wx[c] + o[1] * wy[c] + o[2] * wz[c];
-        }
-    }
+    vectorised(
+        #[inline(always)]
+        || {
+            for (z, o) in z.chunks_exact_mut(channels).zip(offsets.chunks_exact(3)) {
+                for c in 0..channels {
+                    z[c] += o[0] * wx[c] + o[1] * wy[c] + o[2] * wz[c];
+                }
+            }
+        },
+    );
 }
 
 /// y = relu(bn([offset, features[source]] W)) and the largest of every `pool` rows.
@@ -75,12 +80,17 @@ pub(crate) fn norm_relu_backward(features: &[f32], weight: &[f32], edges: &Edges
         .map(|(block, (dz, offsets))| {
             gradient.dz(block * BLOCK, dz);
             let mut dw = vec![0.0; 3 * channels];
-            for (dz, o) in dz.chunks_exact(channels).zip(offsets.chunks_exact(3)) {
-                for (axis, &o) in o.iter().enumerate() {
-                    let dw = &mut dw[axis * channels..(axis + 1) * channels];
-                    dw.iter_mut().zip(dz).for_each(|(dw, dz)| *dw += o * dz);
-                }
-            }
+            vectorised(
+                #[inline(always)]
+                || {
+                    for (dz, o) in dz.chunks_exact(channels).zip(offsets.chunks_exact(3)) {
+                        for (axis, &o) in o.iter().enumerate() {
+                            let dw = &mut dw[axis * channels..(axis + 1) * channels];
+                            dw.iter_mut().zip(dz).for_each(|(dw, dz)| *dw += o * dz);
+                        }
+                    }
+                },
+            );
             dw
         })
         .collect();

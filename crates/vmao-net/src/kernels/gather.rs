@@ -1,6 +1,6 @@
 //! Rows picked by index, and the transpose of that: sums over an inverse index, one owner per row.
 
-use super::blocks::BLOCK;
+use super::blocks::{BLOCK, vectorised};
 use rayon::prelude::*;
 
 /// Which rows of a table are picked, with the inverse lists that make the backward sum deterministic.
@@ -60,13 +60,18 @@ impl Picks {
         assert_eq!(rows.len(), self.sources.len() * channels, "{} picked rows", self.sources.len());
         let mut table = vec![0.0; self.table_rows() * channels];
         table.par_chunks_mut(BLOCK * channels).enumerate().for_each(|(block, chunk)| {
-            for (t, out) in chunk.chunks_exact_mut(channels).enumerate() {
-                let t = block * BLOCK + t;
-                for &row in &self.rows[self.starts[t] as usize..self.starts[t + 1] as usize] {
-                    let row = &rows[row as usize * channels..(row as usize + 1) * channels];
-                    out.iter_mut().zip(row).for_each(|(sum, value)| *sum += value);
-                }
-            }
+            vectorised(
+                #[inline(always)]
+                || {
+                    for (t, out) in chunk.chunks_exact_mut(channels).enumerate() {
+                        let t = block * BLOCK + t;
+                        for &row in &self.rows[self.starts[t] as usize..self.starts[t + 1] as usize] {
+                            let row = &rows[row as usize * channels..(row as usize + 1) * channels];
+                            out.iter_mut().zip(row).for_each(|(sum, value)| *sum += value);
+                        }
+                    }
+                },
+            );
         });
         table
     }

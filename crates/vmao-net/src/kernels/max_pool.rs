@@ -1,6 +1,6 @@
 //! The largest of every `k` consecutive rows, channel by channel.
 
-use super::blocks::BLOCK;
+use super::blocks::{BLOCK, vectorised};
 use rayon::prelude::*;
 
 /// Returns groups × channels and, for each, which of the `k` rows won (the first of equals).
@@ -13,18 +13,23 @@ pub(crate) fn max_pool(x: &[f32], k: usize, channels: usize) -> (Vec<f32>, Vec<u
         .zip(x.par_chunks(BLOCK * k * channels))
         .for_each(|((best, winner), x)| {
             let groups = best.chunks_exact_mut(channels).zip(winner.chunks_exact_mut(channels));
-            for ((best, winner), x) in groups.zip(x.chunks_exact(k * channels)) {
-                best.copy_from_slice(&x[..channels]);
-                for (j, row) in x.chunks_exact(channels).enumerate().skip(1) {
-                    let (best, winner) = (&mut best[..channels], &mut winner[..channels]);
-                    for c in 0..channels {
-                        // Masks, not branches: this loop is as long as the whole grouped layer.
-                        let better = 0_u32.wrapping_sub(u32::from(row[c] > best[c]));
-                        winner[c] = (winner[c] & !better) | (j as u32 & better);
-                        best[c] = best[c].max(row[c]);
+            vectorised(
+                #[inline(always)]
+                || {
+                    for ((best, winner), x) in groups.zip(x.chunks_exact(k * channels)) {
+                        best.copy_from_slice(&x[..channels]);
+                        for (j, row) in x.chunks_exact(channels).enumerate().skip(1) {
+                            let (best, winner) = (&mut best[..channels], &mut winner[..channels]);
+                            for c in 0..channels {
+                                // Masks, not branches: this loop is as long as the whole grouped layer.
+                                let better = 0_u32.wrapping_sub(u32::from(row[c] > best[c]));
+                                winner[c] = (winner[c] & !better) | (j as u32 & better);
+                                best[c] = best[c].max(row[c]);
+                            }
+                        }
                     }
-                }
-            }
+                },
+            );
         });
     (best, winner)
 }

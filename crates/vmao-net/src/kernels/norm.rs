@@ -2,7 +2,7 @@
 //!
 //! ẑ = (z − μ) / √(σ² + ε), y = max(0, γ ẑ + β), with μ and the biased σ² over all rows (Ioffe & Szegedy 2015, Algorithm 1).
 
-use super::blocks::{BLOCK, narrow, sum_blocks};
+use super::blocks::{BLOCK, narrow, sum_blocks, vectorised};
 use rayon::prelude::*;
 
 /// ε of the variance, as in PointNet++'s and PyTorch's layers.
@@ -43,14 +43,19 @@ pub(crate) fn affine(moments: &Moments, gain: &[f32], bias: &[f32]) -> (Vec<f32>
 pub(crate) fn accumulate(z: &[f32], sums: &mut [f32]) {
     let channels = sums.len() / 2;
     let (first, second) = sums.split_at_mut(channels);
-    for row in z.chunks_exact(channels) {
-        // Slices of one known length let the compiler drop the bounds checks and vectorise.
-        let (first, second) = (&mut first[..channels], &mut second[..channels]);
-        for c in 0..channels {
-            first[c] += row[c];
-            second[c] += row[c] * row[c];
-        }
-    }
+    vectorised(
+        #[inline(always)]
+        || {
+            for row in z.chunks_exact(channels) {
+                // Slices of one known length let the compiler drop the bounds checks and vectorise.
+                let (first, second) = (&mut first[..channels], &mut second[..channels]);
+                for c in 0..channels {
+                    first[c] += row[c];
+                    second[c] += row[c] * row[c];
+                }
+            }
+        },
+    );
 }
 
 /// y = max(0, scale z + shift) for all rows.
@@ -59,11 +64,16 @@ fn affine_relu(z: &[f32], scale: &[f32], shift: &[f32]) -> Vec<f32> {
     let mut y = vec![0.0; z.len()];
     y.par_chunks_mut(BLOCK * channels).zip(z.par_chunks(BLOCK * channels)).for_each(|(y, z)| {
         let (scale, shift) = (&scale[..channels], &shift[..channels]);
-        for (y, z) in y.chunks_exact_mut(channels).zip(z.chunks_exact(channels)) {
-            for c in 0..channels {
-                y[c] = (scale[c] * z[c] + shift[c]).max(0.0);
-            }
-        }
+        vectorised(
+            #[inline(always)]
+            || {
+                for (y, z) in y.chunks_exact_mut(channels).zip(z.chunks_exact(channels)) {
+                    for c in 0..channels {
+                        y[c] = (scale[c] * z[c] + shift[c]).max(0.0);
+                    }
+                }
+            },
+        );
     });
     y
 }
@@ -78,25 +88,31 @@ fn affine_relu_max(z: &[f32], scale: &[f32], shift: &[f32], pool: usize) -> (Vec
     outputs.zip(z.par_chunks(BLOCK * pool * channels)).for_each(|((best, winner), z)| {
         let (scale, shift) = (&scale[..channels], &shift[..channels]);
         let groups = best.chunks_exact_mut(channels).zip(winner.chunks_exact_mut(channels));
-        for ((best, winner), z) in groups.zip(z.chunks_exact(pool * channels)) {
-            best.fill(f32::NEG_INFINITY);
-            for (j, row) in z.chunks_exact(channels).enumerate() {
-                let (best, winner) = (&mut best[..channels], &mut winner[..channels]);
-                for c in 0..channels {
-                    let y = scale[c] * row[c] + shift[c];
-                    // Masks, not branches: this loop is as long as the whole grouped layer.
-                    let better = 0_u32.wrapping_sub(u32::from(y > best[c]));
-                    winner[c] = (winner[c] & !better) | (j as u32 & better);
-                    best[c] = best[c].max(y);
+        vectorised(
+            #[inline(always)]
+            || {
+                for ((best, winner), z) in groups.zip(z.chunks_exact(pool * channels)) {
+                    best.fill(f32::NEG_INFINITY);
+                    for (j, row) in z.chunks_exact(channels).enumerate() {
+                        let (best, winner) = (&mut best[..channels], &mut winner[..channels]);
+                        for c in 0..channels {
+                            let y = scale[c] * row[c] + shift[c];
+                            // Masks, not branches: this loop is as long as the whole grouped layer.
+                            let better = 0_u32.wrapping_sub(u32::from(y > best[c]));
+                            winner[c] = (winner[c] & !better) | (j as u32 & better);
+                            best[c] = best[c].max(y);
+                        }
+                    }
+                    best.iter_mut().for_each(|y| *y = y.max(0.0));
                 }
-            }
-            best.iter_mut().for_each(|y| *y = y.max(0.0));
-        }
+            },
+        );
     });
     (best, winner)
 }
 
 /// 1 where ReLU lets the gradient through, else 0: a factor, because a branch would keep the loop from being vectorised.
+#[inline(always)]
 fn alive(y: f32) -> f32 {
     f32::from(u8::from(y > 0.0))
 }
@@ -158,15 +174,20 @@ impl<'a> Gradient<'a> {
             let (gain, bias) = sums.split_at_mut(channels);
             let (gain, bias) = (&mut gain[..channels], &mut bias[..channels]);
             let mut won = vec![0.0; channels];
-            for group in range {
-                let z = tape.winning_row(group, &mut won);
-                let dy = &dy[group * channels..(group + 1) * channels];
-                for c in 0..channels {
-                    let g = dy[c] * alive(scale[c] * z[c] + shift[c]);
-                    gain[c] += g * (z[c] - mean[c]);
-                    bias[c] += g;
-                }
-            }
+            vectorised(
+                #[inline(always)]
+                || {
+                    for group in range {
+                        let z = &tape.winning_row(group, &mut won)[..channels];
+                        let dy = &dy[group * channels..(group + 1) * channels];
+                        for c in 0..channels {
+                            let g = dy[c] * alive(scale[c] * z[c] + shift[c]);
+                            gain[c] += g * (z[c] - mean[c]);
+                            bias[c] += g;
+                        }
+                    }
+                },
+            );
         });
         let inverse = tape.moments.inverse_deviation();
         let gain: Vec<f32> = (0..channels).map(|c| (sums[c] * f64::from(inverse[c])) as f32).collect();
@@ -179,6 +200,14 @@ impl<'a> Gradient<'a> {
 
     /// ∂L/∂z of the rows from `first`: scale (g − mean g − ẑ mean(g ẑ)), g = ∂L/∂y where the row won and y > 0.
     pub(crate) fn dz(&self, first: usize, dz: &mut [f32]) {
+        vectorised(
+            #[inline(always)]
+            || self.dz_inline(first, dz),
+        );
+    }
+
+    #[inline(always)]
+    fn dz_inline(&self, first: usize, dz: &mut [f32]) {
         let channels = self.gain.len();
         let (scale, shift) = (&self.scale[..channels], &self.shift[..channels]);
         let (constant, slope) = (&self.constant[..channels], &self.slope[..channels]);
@@ -213,6 +242,7 @@ impl<'a> Gradient<'a> {
 
 impl Tape {
     /// z of a group where it won, channel by channel; `buffer` holds it if it has to be put together.
+    #[inline(always)]
     fn winning_row<'b>(&'b self, group: usize, buffer: &'b mut [f32]) -> &'b [f32] {
         let channels = self.channels();
         if self.pool == 1 {

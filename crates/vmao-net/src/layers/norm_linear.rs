@@ -1,6 +1,7 @@
 //! A linear map, batch normalisation and ReLU.
 
 use super::Pass;
+use crate::kernels::blocks::vectorised;
 use crate::kernels::matmul::{View, Write, product};
 use crate::kernels::norm::{Moments, affine};
 use crate::operations::{Operations, Rows};
@@ -81,8 +82,13 @@ impl Folded {
         let rows = x.len() / inputs;
         y.resize(rows * self.channels(), 0.0);
         product(y, Write::Replace, View::new(x, rows, inputs), View::new(&self.weight, inputs, self.channels()));
-        for row in y.chunks_exact_mut(self.channels()) {
-            row.iter_mut().zip(&self.bias).for_each(|(y, b)| *y = (*y + b).max(0.0));
-        }
+        vectorised(
+            #[inline(always)]
+            || {
+                for row in y.chunks_exact_mut(self.channels()) {
+                    row.iter_mut().zip(&self.bias).for_each(|(y, b)| *y = (*y + b).max(0.0));
+                }
+            },
+        );
     }
 }

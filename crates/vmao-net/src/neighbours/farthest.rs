@@ -1,5 +1,8 @@
 //! Farthest-point sampling.
 
+use super::columns::LANES;
+use crate::kernels::blocks::vectorised;
+
 /// The first `count` points of `points` in farthest-point order: each is the farthest from all before it.
 ///
 /// The distance to point i counts `weights[i]` times; all ones is PointNet++'s sampling. The first point is the one farthest from the
@@ -15,45 +18,73 @@ pub fn farthest_point_order(points: &[[f32; 3]], weights: &[f32], count: usize) 
     for point in points {
         (0..3).for_each(|axis| mean[axis] += f64::from(point[axis]) / points.len() as f64);
     }
-    let axis = |axis: usize| points.iter().map(|p| (f64::from(p[axis]) - mean[axis]) as f32).collect::<Vec<f32>>();
-    let (x, y, z) = (axis(0), axis(1), axis(2));
-    let squared: Vec<f32> = weights.iter().map(|w| w * w).collect();
-    let mut distance: Vec<f32> = (0..points.len()).map(|i| squared[i] * (x[i] * x[i] + y[i] * y[i] + z[i] * z[i])).collect();
+    let axis = |axis: usize| padded(points.iter().map(|p| (f64::from(p[axis]) - mean[axis]) as f32), 0.0);
+    let mut cloud = Remaining {
+        x: axis(0),
+        y: axis(1),
+        z: axis(2),
+        squared_weight: padded(weights.iter().map(|w| w * w), 0.0),
+        // What fills the last group up counts as taken.
+        distance: padded(points.iter().map(|_| f32::INFINITY), f32::NEG_INFINITY),
+    };
     let mut order = Vec::with_capacity(count);
-    let mut last = largest(&distance);
-    distance.fill(f32::INFINITY);
-    loop {
-        order.push(last as u32);
-        if order.len() == count {
-            return order;
-        }
-        // A point that was taken never comes again, even in a cloud of equal points.
-        distance[last] = f32::NEG_INFINITY;
-        let (cx, cy, cz) = (x[last], y[last], z[last]);
-        for ((((distance, weight), x), y), z) in distance.iter_mut().zip(&squared).zip(&x).zip(&y).zip(&z) {
-            let (dx, dy, dz) = (x - cx, y - cy, z - cz);
-            let gap = weight * (dx * dx + dy * dy + dz * dz);
-            *distance = if gap < *distance { gap } else { *distance };
-        }
-        last = largest(&distance);
-    }
+    vectorised(
+        #[inline(always)]
+        || {
+            let mut last = cloud.approach([0.0; 3]);
+            cloud.distance.as_flattened_mut()[..points.len()].fill(f32::INFINITY);
+            loop {
+                order.push(last as u32);
+                if order.len() == count {
+                    return;
+                }
+                // A point that was taken never comes again, even in a cloud of equal points.
+                let (group, lane) = (last / LANES, last % LANES);
+                cloud.distance[group][lane] = f32::NEG_INFINITY;
+                last = cloud.approach([cloud.x[group][lane], cloud.y[group][lane], cloud.z[group][lane]]);
+            }
+        },
+    );
+    order
 }
 
-/// Index of the largest value; the lowest of equals.
-fn largest(values: &[f32]) -> usize {
-    const LANES: usize = 16;
-    let mut best = [f32::NEG_INFINITY; LANES];
-    let (whole, rest) = values.as_chunks::<LANES>();
-    for chunk in whole {
-        for (best, &value) in best.iter_mut().zip(chunk) {
-            *best = if value > *best { value } else { *best };
+/// A cloud by coordinate, with the weighted squared distance of each point from the nearest that was taken.
+#[derive(Debug)]
+struct Remaining {
+    x: Vec<[f32; LANES]>,
+    y: Vec<[f32; LANES]>,
+    z: Vec<[f32; LANES]>,
+    squared_weight: Vec<[f32; LANES]>,
+    distance: Vec<[f32; LANES]>,
+}
+
+fn padded(values: impl ExactSizeIterator<Item = f32>, filler: f32) -> Vec<[f32; LANES]> {
+    let mut groups = vec![[filler; LANES]; values.len().div_ceil(LANES)];
+    groups.as_flattened_mut().iter_mut().zip(values).for_each(|(slot, value)| *slot = value);
+    groups
+}
+
+impl Remaining {
+    /// Takes `centre` into account and returns the farthest point; the lowest index of equals.
+    #[inline(always)]
+    fn approach(&mut self, centre: [f32; 3]) -> usize {
+        let (mut best, mut place) = ([f32::NEG_INFINITY; LANES], [0_u32; LANES]);
+        let points = self.x.iter().zip(&self.y).zip(&self.z).zip(&self.squared_weight);
+        for (group, (distance, (((x, y), z), weight))) in self.distance.iter_mut().zip(points).enumerate() {
+            for lane in 0..LANES {
+                let (dx, dy, dz) = (x[lane] - centre[0], y[lane] - centre[1], z[lane] - centre[2]);
+                let gap = weight[lane] * (dx * dx + dy * dy + dz * dz);
+                let least = if gap < distance[lane] { gap } else { distance[lane] };
+                distance[lane] = least;
+                let better = least > best[lane];
+                best[lane] = if better { least } else { best[lane] };
+                place[lane] = if better { group as u32 } else { place[lane] };
+            }
         }
+        let index = |lane: usize| place[lane] as usize * LANES + lane;
+        let ahead = |a: usize, b: usize| best[a] > best[b] || (best[a] >= best[b] && index(a) < index(b));
+        index((1..LANES).fold(0, |winner, lane| if ahead(lane, winner) { lane } else { winner }))
     }
-    for (best, &value) in best.iter_mut().zip(rest) {
-        *best = best.max(value);
-    }
-    let top = best.iter().fold(f32::NEG_INFINITY, |a, &b| a.max(b));
-    values.iter().position(|&value| value >= top).unwrap_or(0)
 }
 
 #[cfg(test)]

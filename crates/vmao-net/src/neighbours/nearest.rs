@@ -1,31 +1,58 @@
-//! Nearest neighbours by exhaustive search.
+//! Nearest neighbours by exhaustive search, a vector of points at a time.
 
-use super::squared_distance;
+use super::columns::{Columns, TASK};
+use crate::kernels::blocks::vectorised;
+use rayon::prelude::*;
 
 /// For each query its `count` nearest of `points`, nearest first; row-major queries × count. Panics if there are fewer points.
 pub fn nearest(points: &[[f32; 3]], queries: &[[f32; 3]], count: usize) -> Vec<u32> {
     assert!(count <= points.len(), "{count} neighbours among {} points", points.len());
-    let mut out = Vec::with_capacity(queries.len() * count);
-    let mut best: Vec<(f32, u32)> = Vec::with_capacity(count + 1);
-    for &query in queries {
-        best.clear();
-        for (i, &point) in points.iter().enumerate() {
-            let distance = squared_distance(point, query);
-            if best.len() == count && distance >= best[count - 1].0 {
-                continue;
-            }
-            let place = best.iter().rposition(|&(d, _)| d <= distance).map_or(0, |p| p + 1);
-            best.insert(place, (distance, i as u32));
-            best.truncate(count);
-        }
-        out.extend(best.iter().map(|&(_, i)| i));
-    }
+    let columns = Columns::new(points);
+    let mut out = vec![0; queries.len() * count];
+    out.par_chunks_mut((TASK * count).max(1)).zip(queries.par_chunks(TASK)).for_each(|(out, queries)| {
+        let mut best = vec![(f32::INFINITY, 0); count];
+        vectorised(
+            #[inline(always)]
+            || {
+                for (row, &query) in out.chunks_exact_mut(count).zip(queries) {
+                    closest(&mut best, &columns, query);
+                    row.iter_mut().zip(&best).for_each(|(slot, &(_, index))| *slot = index);
+                }
+            },
+        );
+    });
     out
+}
+
+/// Fills `best` with the closest points and their squared distances, sorted; of equals the lower index comes first.
+#[inline(always)]
+fn closest(best: &mut [(f32, u32)], columns: &Columns, query: [f32; 3]) {
+    best.fill((f32::INFINITY, 0));
+    let last = best.len() - 1;
+    columns.scan(
+        query,
+        f32::INFINITY,
+        #[inline(always)]
+        |start, gaps| {
+            for (lane, &gap) in gaps.iter().enumerate() {
+                if gap < best[last].0 {
+                    let mut place = last;
+                    while place > 0 && best[place - 1].0 > gap {
+                        best[place] = best[place - 1];
+                        place -= 1;
+                    }
+                    best[place] = (gap, (start + lane) as u32);
+                }
+            }
+            best[last].0
+        },
+    );
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::neighbours::squared_distance;
     use vmao_core::random::Stream;
 
     #[test]

@@ -28,6 +28,11 @@ pub(crate) struct Scene {
 const COUNTS: [usize; 4] = [440, 270, 155, 155];
 
 pub(crate) fn scene(seed: u64, index: u64) -> Scene {
+    denser_scene(seed, index, 1)
+}
+
+/// The same with `times` as many points.
+pub(crate) fn denser_scene(seed: u64, index: u64, times: usize) -> Scene {
     let mut s = Stream::new(seed, &[index]);
     let yaw = s.range(-std::f64::consts::PI, std::f64::consts::PI);
     let position = [s.range(-0.07, 0.07), s.range(-0.07, 0.07)];
@@ -37,23 +42,23 @@ pub(crate) fn scene(seed: u64, index: u64) -> Scene {
         let (sin, cos) = yaw.sin_cos();
         [position[0] + cos * p[0] - sin * p[1], position[1] + sin * p[0] + cos * p[1], p[2]].map(|x| x as f32)
     };
-    for _ in 0..COUNTS[0] {
+    for _ in 0..times * COUNTS[0] {
         points.push(world(on_box(BAR, &mut s)));
         colors.push([0.8, 0.2, 0.15]);
     }
-    for _ in 0..COUNTS[1] {
+    for _ in 0..times * COUNTS[1] {
         let p = on_box(CROSSING, &mut s);
         let (sin, cos) = tilt.sin_cos();
         let along = p[0] + 0.018;
         points.push(world([cos * along - sin * p[1], sin * along + cos * p[1], p[2]]));
         colors.push([0.15, 0.25, 0.8]);
     }
-    for _ in 0..COUNTS[2] {
+    for _ in 0..times * COUNTS[2] {
         points.push([s.range(-0.25, 0.25) as f32, s.range(-0.25, 0.25) as f32, 0.0]);
         colors.push([0.6, 0.55, 0.5]);
     }
     let (azimuth, distance, height) = (s.range(0.0, std::f64::consts::TAU), s.range(0.12, 0.2), s.range(0.05, 0.2));
-    for _ in 0..COUNTS[3] {
+    for _ in 0..times * COUNTS[3] {
         let p = on_box([0.03, 0.03, 0.15], &mut s);
         let (x, y) = (position[0] + distance * azimuth.cos() + p[0], position[1] + distance * azimuth.sin() + p[1]);
         points.push([x, y, height + p[2]].map(|x| x as f32));
