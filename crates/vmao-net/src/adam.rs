@@ -9,9 +9,9 @@ const EPSILON: f32 = 1e-8;
 /// Running means of the gradients and of their squares.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Adam {
-    first: Vec<Vec<f32>>,
-    second: Vec<Vec<f32>>,
-    step: i32,
+    pub(crate) first: Vec<Vec<f32>>,
+    pub(crate) second: Vec<Vec<f32>>,
+    pub(crate) step: i32,
 }
 
 impl Adam {

@@ -1,11 +1,11 @@
-//! A trained network as bytes: weights in safetensors, everything else in JSON.
+//! A trained network as bytes: weights and how they came about in safetensors, the network's configuration also in JSON.
 
 use crate::config::{ModelKind, NetworkConfig};
-use crate::device::Device;
 use crate::error::Error;
-use crate::parameters::{Layout, Parameters, Spec, Start};
+use crate::lesson::{Lesson, Origin};
+use crate::parameters::Parameters;
+use crate::sealed::{Sealed, Sealing, Wanted};
 use crate::training::Elbo;
-use safetensors::{Dtype, SafeTensors, tensor::TensorView};
 use serde::{Deserialize, Serialize};
 
 /// What a network of a kind and configuration learned, and how well.
@@ -15,8 +15,8 @@ pub struct Checkpoint {
     pub kind: ModelKind,
     /// The network.
     pub network: NetworkConfig,
-    /// What trained it.
-    pub device: Device,
+    /// What it was trained on, and how.
+    pub origin: Origin,
     /// The epoch the weights are from, from one.
     pub epoch: usize,
     /// The validation terms of that epoch.
@@ -24,105 +24,110 @@ pub struct Checkpoint {
     pub(crate) parameters: Parameters,
 }
 
-/// What `config.json` beside the weights holds.
-#[derive(Debug, Serialize, Deserialize)]
+/// What `config.json` beside the weights holds: it is the same for all epochs of a training.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-struct Description {
+pub(crate) struct Description {
     format: u32,
     kind: ModelKind,
     network: NetworkConfig,
-    /// Documents from before there was a choice have none.
-    #[serde(default)]
-    device: Device,
+    origin: Origin,
+}
+
+/// The description inside `model.safetensors`.
+#[derive(Debug, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Inside {
+    config: Description,
     epoch: usize,
     validation: Option<Elbo>,
 }
 
-/// Version of the checkpoint's names and meanings.
-const FORMAT: u32 = 1;
+/// Version of the names and meanings of checkpoints and training states.
+const FORMAT: u32 = 2;
+
+impl Description {
+    pub(crate) fn new(kind: ModelKind, network: &NetworkConfig, origin: &Origin) -> Self {
+        Self { format: FORMAT, kind, network: network.clone(), origin: origin.clone() }
+    }
+
+    pub(crate) fn checkpoint(&self, epoch: usize, validation: Option<Elbo>, parameters: Parameters) -> Checkpoint {
+        let Self { kind, network, origin, .. } = self.clone();
+        Checkpoint { kind, network, origin, epoch, validation, parameters }
+    }
+
+    pub(crate) fn to_json(&self) -> Result<String, Error> {
+        serde_json::to_string_pretty(self).map_err(|error| Error::ConfigJson { reason: error.to_string() })
+    }
+
+    /// Refuses what no network can be built from.
+    fn validate(&self) -> Result<(), Error> {
+        if self.format != FORMAT {
+            let (found, expected) = (self.format.to_string(), FORMAT.to_string());
+            return Err(Error::Config { field: "format".to_owned(), found, expected });
+        }
+        self.network.validate()
+    }
+
+    /// Refuses another description, naming the first value that differs; the words say where this one and the other are from.
+    pub(crate) fn check_same(&self, what: &'static str, expected: &Self, whose: &'static str) -> Result<(), Error> {
+        if self == expected {
+            return Ok(());
+        }
+        // Through the text, in which single precision has no more digits than it needs.
+        let parse = |text: &str| serde_json::from_str(text).map_err(|error| Error::ConfigJson { reason: error.to_string() });
+        let (found, expected) = (parse(&self.to_json()?)?, parse(&expected.to_json()?)?);
+        let (field, found, expected) = difference("", &found, &expected).unwrap_or_default();
+        Err(Error::Differs { what, field, found, expected, whose })
+    }
+}
+
+/// Where two documents first differ, and what stands there in each.
+fn difference(path: &str, a: &serde_json::Value, b: &serde_json::Value) -> Option<(String, String, String)> {
+    use serde_json::Value::Object;
+    if let (Object(a), Object(b)) = (a, b)
+        && a.keys().eq(b.keys())
+    {
+        let dot = if path.is_empty() { "" } else { "." };
+        return a.iter().find_map(|(key, a)| difference(&format!("{path}{dot}{key}"), a, &b[key]));
+    }
+    (a != b).then(|| (path.to_owned(), a.to_string(), b.to_string()))
+}
 
 impl Checkpoint {
+    fn description(&self) -> Description {
+        Description::new(self.kind, &self.network, &self.origin)
+    }
+
     /// The weights as a safetensors file: float32, weights inputs × channels, vectors with one dimension.
     pub fn to_safetensors(&self) -> Result<Vec<u8>, Error> {
         let (layout, _) = self.kind.layers(&self.network);
-        let bytes: Vec<Vec<u8>> =
-            self.parameters.values.iter().map(|v| v.iter().flat_map(|x| x.to_le_bytes()).collect()).collect();
-        let view = |(spec, bytes): (&Spec, &'_ Vec<u8>)| (spec.name.clone(), stored_shape(spec), bytes.len());
-        let described: Vec<_> = layout.specs().iter().zip(&bytes).map(view).collect();
-        let refuse =
-            |error: safetensors::SafeTensorError, bytes: usize| Error::NotSafetensors { bytes, reason: error.to_string() };
-        let mut views = Vec::with_capacity(bytes.len());
-        for ((name, shape, length), bytes) in described.into_iter().zip(&bytes) {
-            views.push((name, TensorView::new(Dtype::F32, shape, bytes).map_err(|e| refuse(e, length))?));
-        }
-        safetensors::serialize(views, None).map_err(|error| refuse(error, 0))
+        let mut sealing = Sealing::default();
+        sealing.add("", &layout, &self.parameters.values);
+        sealing.finish(&Inside { config: self.description(), epoch: self.epoch, validation: self.validation })
     }
 
-    /// Kind, network and validation terms as JSON.
+    /// Kind, network and training as JSON.
     pub fn config_json(&self) -> Result<String, Error> {
-        let description = Description {
-            format: FORMAT,
-            kind: self.kind,
-            network: self.network.clone(),
-            device: self.device,
-            epoch: self.epoch,
-            validation: self.validation,
-        };
-        serde_json::to_string_pretty(&description).map_err(|error| Error::ConfigJson { reason: error.to_string() })
+        self.description().to_json()
     }
 
-    /// Reads both again. Refuses what is not exactly a network of the described kind with finite weights.
+    /// Reads both again. Refuses what is not exactly a network of the described kind with finite weights, as it was written.
     pub fn from_safetensors(bytes: &[u8], config_json: &str) -> Result<Self, Error> {
-        let description: Description =
+        let outside: Description =
             serde_json::from_str(config_json).map_err(|error| Error::ConfigJson { reason: error.to_string() })?;
-        if description.format != FORMAT {
-            let (found, expected) = (description.format.to_string(), FORMAT.to_string());
-            return Err(Error::Config { field: "format".to_owned(), found, expected });
-        }
-        description.network.validate()?;
-        let file = SafeTensors::deserialize(bytes)
-            .map_err(|error| Error::NotSafetensors { bytes: bytes.len(), reason: error.to_string() })?;
-        let (layout, _) = description.kind.layers(&description.network);
-        let parameters = read(&layout, &file, description.kind)?;
-        let Description { kind, network, device, epoch, validation, .. } = description;
-        Ok(Self { kind, network, device, epoch, validation, parameters })
+        outside.validate()?;
+        let mut file = Sealed::open(bytes)?;
+        let (layout, _) = outside.kind.layers(&outside.network);
+        let parameters = file.parameters("", &layout, Wanted::Weights)?;
+        let Inside { config, epoch, validation } = file.description()?;
+        outside.check_same("config.json", &config, "the file beside it")?;
+        file.finish(&format!("{:?} network of this configuration", outside.kind))?;
+        Ok(outside.checkpoint(epoch, validation, parameters))
     }
-}
 
-fn read(layout: &Layout, file: &SafeTensors<'_>, kind: ModelKind) -> Result<Parameters, Error> {
-    let mut names: Vec<&str> = file.names();
-    names.sort_unstable();
-    let mut values = Vec::with_capacity(layout.specs().len());
-    for spec in layout.specs() {
-        let Ok(view) = file.tensor(&spec.name) else {
-            return Err(Error::MissingTensor { name: spec.name.clone(), available: names.join(", ") });
-        };
-        let expected = stored_shape(spec);
-        if view.dtype() != Dtype::F32 || view.shape() != expected {
-            return Err(Error::TensorShape {
-                name: spec.name.clone(),
-                found: format!("{:?} {:?}", view.dtype(), view.shape()),
-                expected: format!("{:?} {expected:?}", Dtype::F32),
-            });
-        }
-        let array: Vec<f32> = view.data().as_chunks::<4>().0.iter().map(|bytes| f32::from_le_bytes(*bytes)).collect();
-        let is_variance = spec.name.ends_with("running_var");
-        if let Some(element) = array.iter().position(|x| !x.is_finite() || (is_variance && *x < 0.0)) {
-            let expected = if is_variance { "finite values of zero or more" } else { "finite values" };
-            let (name, value) = (spec.name.clone(), array[element]);
-            return Err(Error::TensorValue { name, value, element, expected: expected.to_owned() });
-        }
-        values.push(array);
-    }
-    if let Some(name) = names.iter().find(|name| layout.specs().iter().all(|spec| spec.name != **name)) {
-        return Err(Error::UnknownTensor { name: (*name).to_owned(), kind: format!("{kind:?}") });
-    }
-    Ok(Parameters { values })
-}
-
-fn stored_shape(spec: &Spec) -> Vec<usize> {
-    match spec.start {
-        Start::Normal(_) => spec.shape.to_vec(),
-        Start::Constant(_) | Start::Statistic(_) => vec![spec.shape[1]],
+    /// Refuses a checkpoint that another lesson left, naming the first value that differs.
+    pub fn check_of(&self, lesson: &Lesson<'_>) -> Result<(), Error> {
+        self.description().check_same("the finished network", &lesson.description(), "this training")
     }
 }

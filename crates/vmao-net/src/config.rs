@@ -127,6 +127,8 @@ pub struct TrainingConfig {
     pub learning_rate: f32,
     /// Adam's step size at the end; a half cosine lies between.
     pub final_learning_rate: f32,
+    /// Epochs after the warm-up without a better validation loss that end the training; 0 for all epochs.
+    pub patience: usize,
     /// Share of the examples kept for validation.
     pub validation_fraction: f32,
     /// Random changes of the training clouds.
@@ -236,6 +238,7 @@ impl TrainingConfig {
             batch_size: 8,
             learning_rate: 1e-2,
             final_learning_rate: 1e-4,
+            patience: 12,
             validation_fraction: 0.1,
             augmentation: AugmentationConfig { rotation: 0.8, jitter: 0.003, color_gain: 0.3 },
         }
@@ -243,7 +246,7 @@ impl TrainingConfig {
 
     /// Refuses what cannot be trained with.
     pub fn validate(&self) -> Result<(), Error> {
-        check("epochs", self.epochs, self.epochs > 0, "at least 1")?;
+        check("epochs", self.epochs, (1..=10_000_000).contains(&self.epochs), "1 to 10000000")?;
         check("batch_size", self.batch_size, (1..=4096).contains(&self.batch_size), "1 to 4096")?;
         for (field, value) in [("learning_rate", self.learning_rate), ("final_learning_rate", self.final_learning_rate)] {
             check(field, value, value > 0.0 && value.is_finite(), "positive")?;

@@ -38,7 +38,9 @@ pub enum Error {
     },
     /// The loss or a weight is no longer a number.
     #[error(
-        "the {what} became {value} at step {step} (epoch {epoch}, batch {batch} of that epoch); a lower learning rate may help"
+        "the {what} became {value} at step {step} (epoch {epoch}, {}, examples {}); a lower learning rate may help",
+        batch.map_or("the validation after it".to_owned(), |batch| format!("batch {batch} of it")),
+        listed(examples)
     )]
     Diverged {
         /// Loss or weight.
@@ -49,8 +51,10 @@ pub enum Error {
         step: usize,
         /// Epoch, from one.
         epoch: usize,
-        /// Batch of the epoch, from one; zero for the validation after it.
-        batch: usize,
+        /// Batch of the epoch, from one; none for the validation after it.
+        batch: Option<usize>,
+        /// The examples of the batch, from zero.
+        examples: Vec<usize>,
     },
     /// The device that trains failed.
     #[error("the {device} device failed: {reason}; train on the CPU, or with smaller batches if it ran out of memory")]
@@ -60,6 +64,33 @@ pub enum Error {
         /// The first line of what it said.
         reason: String,
     },
+    /// A checkpoint or a training state of something else than what is asked for.
+    #[error("{what} has {field} = {found}, expected {expected} as {whose} says")]
+    Differs {
+        /// Which of the two.
+        what: &'static str,
+        /// The first value that differs.
+        field: String,
+        /// Its value.
+        found: String,
+        /// What it should be.
+        expected: String,
+        /// Where that stands.
+        whose: &'static str,
+    },
+    /// A file whose content is not what was once written.
+    #[error(
+        "the file was changed after it was written: its content has the digest {found}, expected {expected} as it says itself"
+    )]
+    Altered {
+        /// Digest of what is there.
+        found: String,
+        /// Digest that the file states.
+        expected: String,
+    },
+    /// Weights were asked for before the first epoch.
+    #[error("nothing was trained yet, expected at least one epoch")]
+    NothingToSave,
     /// The bytes are not a safetensors file.
     #[error("not a readable safetensors file of {bytes} bytes: {reason}")]
     NotSafetensors {
@@ -77,11 +108,11 @@ pub enum Error {
         available: String,
     },
     /// A tensor that the network does not have.
-    #[error("the checkpoint has a tensor `{name}` that a {kind} network of this configuration does not")]
+    #[error("the checkpoint has a tensor `{name}` that a {kind} does not have")]
     UnknownTensor {
         /// Its name.
         name: String,
-        /// The kind of network.
+        /// What the file should hold.
         kind: String,
     },
     /// A tensor of the wrong shape or element type.
@@ -116,4 +147,9 @@ pub enum Error {
         /// What was expected.
         expected: String,
     },
+}
+
+/// Numbers, comma-separated.
+fn listed(numbers: &[usize]) -> String {
+    numbers.iter().map(usize::to_string).collect::<Vec<_>>().join(", ")
 }

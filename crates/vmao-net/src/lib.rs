@@ -12,11 +12,13 @@ mod batch;
 mod checkpoint;
 mod cloud;
 mod config;
+mod course;
 mod cvae;
 mod device;
 mod error;
 mod kernels;
 mod layers;
+mod lesson;
 mod network;
 mod objective;
 #[cfg(test)]
@@ -26,6 +28,7 @@ mod parameters;
 mod pyramid;
 #[cfg(test)]
 mod pytorch_goldens;
+mod sealed;
 mod training;
 
 pub use checkpoint::Checkpoint;
@@ -33,7 +36,9 @@ pub use cloud::Example;
 pub use config::{
     AbstractionConfig, AugmentationConfig, LatentPlacement, ModelKind, NetworkConfig, TrainingConfig, UpConvConfig,
 };
+pub use course::{Training, train};
 pub use device::Device;
 pub use error::Error;
+pub use lesson::{Lesson, Origin};
 pub use network::{ContactNetwork, EncodedScene};
-pub use training::{Elbo, EpochReport, train};
+pub use training::{Elbo, EpochReport};

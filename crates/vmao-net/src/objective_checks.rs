@@ -100,7 +100,7 @@ fn prediction_equals_training_when_the_statistics_are_the_batchs() {
     let mut trainer = Trainer::new(ModelKind::Vmao, &config, &TrainingConfig::small(), 2, Device::Cpu);
     // The first step takes the batch's moments whole; with a step size of zero the weights stay.
     let noise = vec![0.0; 3];
-    let trained = trainer.step(&batch, noise, config.beta, 0.0, (1, 1)).unwrap();
+    let (trained, _) = trainer.step(&batch, noise, config.beta, 0.0).unwrap();
     let network = ContactNetwork::fold(&trainer.cvae, &config, &trainer.parameters);
     let scene = network.encode_prepared(&prepared[0]);
     let (mean, log_variance) = network.posterior(&scene, &prepared[0].maps).unwrap();
@@ -121,7 +121,7 @@ fn one_batch_is_learned_by_heart() {
     let mut first = 0.0;
     for step in 0..300 {
         let noise = normal(step, 12);
-        last = trainer.step(&batch, noise, config.beta, 5e-3, (1, 1)).unwrap().reconstruction - entropy;
+        last = trainer.step(&batch, noise, config.beta, 5e-3).unwrap().0.reconstruction - entropy;
         if step == 0 {
             first = last;
         }

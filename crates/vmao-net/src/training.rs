@@ -2,8 +2,6 @@
 
 use crate::adam::Adam;
 use crate::batch::{Batch, Prepared};
-use crate::checkpoint::Checkpoint;
-use crate::cloud::{Example, check_cloud};
 use crate::config::{ModelKind, NetworkConfig, TrainingConfig};
 use crate::cvae::Cvae;
 use crate::device::Device;
@@ -14,12 +12,9 @@ use crate::objective::Objective;
 use crate::parameters::{Layout, Parameters};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
-use std::ops::ControlFlow;
 use vmao_core::random::Stream;
 
-// Stream labels; 1 is the start of the weights.
-const LABEL_SPLIT: u64 = 2;
-const LABEL_THIN: u64 = 3;
+// Stream labels; 1 is the start of the weights, 2 and 3 are those of `course.rs`.
 const LABEL_ORDER: u64 = 4;
 const LABEL_AUGMENT: u64 = 5;
 const LABEL_NOISE: u64 = 6;
@@ -53,86 +48,34 @@ pub struct EpochReport {
     pub beta: f32,
     /// Adam's step size in this epoch.
     pub learning_rate: f32,
-}
-
-/// Trains a network from nothing on `device`. The weights of the best validation loss (or of the last epoch, without validation) are returned.
-///
-/// `on_epoch` sees every epoch and may end the training early with [`ControlFlow::Break`]. Fails on an invalid configuration or
-/// example, and as soon as a loss or a weight is not finite.
-pub fn train(
-    kind: ModelKind,
-    network: &NetworkConfig,
-    training: &TrainingConfig,
-    examples: &[Example],
-    seed: u64,
-    device: Device,
-    on_epoch: &mut dyn FnMut(&EpochReport) -> ControlFlow<()>,
-) -> Result<Checkpoint, Error> {
-    network.validate()?;
-    training.validate()?;
-    check_examples(examples, network)?;
-    let prepared: Vec<Prepared> = examples
-        .par_iter()
-        .enumerate()
-        .map(|(i, example)| Prepared::new(example, network, &mut Stream::new(seed, &[LABEL_THIN, i as u64])))
-        .collect();
-    let order = Stream::new(seed, &[LABEL_SPLIT]).permutation(examples.len());
-    let held_out = (examples.len() as f32 * training.validation_fraction).round() as usize;
-    let (validation, fitted) = order.split_at(held_out.min(examples.len() - 1));
-    let mut trainer = Trainer::new(kind, network, training, seed, device);
-    let mut best: Option<(f32, Checkpoint)> = None;
-    for epoch in 1..=training.epochs {
-        let (mean, beta, learning_rate) = trainer.epoch(epoch, &prepared, fitted)?;
-        let validated = trainer.validate(&prepared, validation);
-        let report = EpochReport { epoch, epochs: training.epochs, training: mean, validation: validated, beta, learning_rate };
-        let loss = validated.map_or(f32::NEG_INFINITY, |elbo| elbo.reconstruction + network.beta * elbo.kl);
-        if loss.is_nan() || loss == f32::INFINITY {
-            return Err(Error::Diverged {
-                what: "validation loss".to_owned(),
-                value: loss,
-                step: trainer.steps,
-                epoch,
-                batch: 0,
-            });
-        }
-        if best.as_ref().is_none_or(|(least, _)| loss < *least || validated.is_none()) {
-            best = Some((loss, trainer.checkpoint(epoch, validated)));
-        }
-        if on_epoch(&report).is_break() {
-            break;
-        }
-    }
-    best.map(|(_, checkpoint)| checkpoint).ok_or(Error::TooFewExamples { found: 0, needed: 1 })
-}
-
-fn check_examples(examples: &[Example], network: &NetworkConfig) -> Result<(), Error> {
-    if examples.len() < 2 {
-        return Err(Error::TooFewExamples { found: examples.len(), needed: 2 });
-    }
-    for (index, example) in examples.iter().enumerate() {
-        check_cloud(&example.points, &example.colors, network.fewest_points())
-            .map_err(|error| Error::Example { index, problem: error.to_string() })?;
-        if example.contacts.iter().flatten().any(|x| !x.is_finite()) {
-            let problem = format!("contacts are {:?}, expected finite numbers", example.contacts);
-            return Err(Error::Example { index, problem });
-        }
-    }
-    Ok(())
+    /// Euclidean length of the gradient of all weights, mean over the batches.
+    pub gradient_norm: f32,
+    /// The epoch of the best validation loss so far, or this one without validation.
+    pub best_epoch: usize,
 }
 
 /// A network on its way: weights, optimiser, and what the seed determines.
 #[derive(Debug)]
 pub(crate) struct Trainer {
-    kind: ModelKind,
-    network: NetworkConfig,
-    training: TrainingConfig,
+    pub(crate) network: NetworkConfig,
+    pub(crate) training: TrainingConfig,
     seed: u64,
     device: Device,
     pub(crate) layout: Layout,
     pub(crate) cvae: Cvae,
     pub(crate) parameters: Parameters,
-    adam: Adam,
-    steps: usize,
+    pub(crate) adam: Adam,
+    /// Optimiser steps done.
+    pub(crate) steps: usize,
+}
+
+/// Why a step came to nothing.
+#[derive(Debug)]
+pub(crate) enum Stopped {
+    /// Something is no longer a finite number: what, and its value.
+    NotFinite(String, f32),
+    /// The device failed.
+    Device(Error),
 }
 
 impl Trainer {
@@ -140,30 +83,36 @@ impl Trainer {
         let (layout, cvae) = kind.layers(network);
         let parameters = layout.start(seed);
         let adam = Adam::new(layout.specs());
-        Self {
-            kind,
-            network: network.clone(),
-            training: training.clone(),
-            seed,
-            device,
-            layout,
-            cvae,
-            parameters,
-            adam,
-            steps: 0,
-        }
+        Self { network: network.clone(), training: training.clone(), seed, device, layout, cvae, parameters, adam, steps: 0 }
     }
 
-    /// One pass over `fitted`; returns the mean terms, β and the step size.
-    fn epoch(&mut self, epoch: usize, prepared: &[Prepared], fitted: &[usize]) -> Result<(Elbo, f32, f32), Error> {
+    /// Takes over what an earlier process came to.
+    pub(crate) fn restore(&mut self, parameters: Parameters, (first, second): (Vec<Vec<f32>>, Vec<Vec<f32>>), steps: usize) {
+        self.parameters = parameters;
+        self.adam = Adam { first, second, step: steps as i32 };
+        self.steps = steps;
+    }
+
+    /// Epochs until β is at its full weight.
+    pub(crate) fn warm_up_epochs(&self) -> usize {
+        (self.network.warm_up * self.training.epochs as f32).ceil() as usize
+    }
+
+    /// Full batches in so many examples.
+    pub(crate) fn batches(&self, fitted: usize) -> usize {
+        fitted / self.training.batch_size.min(fitted)
+    }
+
+    /// One pass over `fitted`, not validated.
+    pub(crate) fn epoch(&mut self, epoch: usize, prepared: &[Prepared], fitted: &[usize]) -> Result<EpochReport, Error> {
         let progress = (epoch - 1) as f32 / self.training.epochs as f32;
         let beta = self.network.beta * if self.network.warm_up > 0.0 { (progress / self.network.warm_up).min(1.0) } else { 1.0 };
         let (first, last) = (self.training.learning_rate, self.training.final_learning_rate);
         let learning_rate = last + 0.5 * (first - last) * (1.0 + (std::f32::consts::PI * progress).cos());
         let order = Stream::new(self.seed, &[LABEL_ORDER, epoch as u64]).permutation(fitted.len());
         let size = self.training.batch_size.min(fitted.len());
-        let mut sum = Elbo { reconstruction: 0.0, kl: 0.0 };
-        let batches = fitted.len() / size;
+        let (mut sum, mut length) = (Elbo { reconstruction: 0.0, kl: 0.0 }, 0.0);
+        let batches = self.batches(fitted.len());
         // A last batch that is not full would have noisier statistics; its members come first in another epoch's order.
         for (number, members) in order.chunks_exact(size).enumerate() {
             let chosen: Vec<usize> = members.iter().map(|&m| fitted[m]).collect();
@@ -178,34 +127,63 @@ impl Trainer {
             let batch = Batch::new(&clouds, &self.network);
             let mut stream = Stream::new(self.seed, &[LABEL_NOISE, self.steps as u64]);
             let noise = (0..batch.clouds * self.cvae.latent_size()).map(|_| stream.normal() as f32).collect();
-            let terms = self.step(&batch, noise, beta, learning_rate, (epoch, number + 1))?;
+            let step = self.steps;
+            let stepped = self.step(&batch, noise, beta, learning_rate);
+            let finite =
+                stepped.and_then(|terms| if number + 1 < batches { Ok(terms) } else { self.check_finite().map(|()| terms) });
+            let (terms, gradient_norm) = finite.map_err(|stopped| match stopped {
+                Stopped::NotFinite(what, value) => {
+                    let (batch, mut examples) = (Some(number + 1), chosen);
+                    examples.sort_unstable();
+                    Error::Diverged { what, value, step, epoch, batch, examples }
+                }
+                Stopped::Device(error) => error,
+            })?;
             sum.reconstruction += terms.reconstruction / batches as f32;
             sum.kl += terms.kl / batches as f32;
+            length += gradient_norm / batches as f32;
         }
-        Ok((sum, beta, learning_rate))
+        Ok(EpochReport {
+            epoch,
+            epochs: self.training.epochs,
+            training: sum,
+            validation: None,
+            beta,
+            learning_rate,
+            gradient_norm: length,
+            best_epoch: epoch,
+        })
     }
 
-    /// One optimiser step; an error names what is not finite, and the epoch and batch of it.
-    pub(crate) fn step(
-        &mut self,
-        batch: &Batch,
-        noise: Vec<f32>,
-        beta: f32,
-        learning_rate: f32,
-        (epoch, number): (usize, usize),
-    ) -> Result<Elbo, Error> {
-        let Objective { terms, gradients, moments } = self.objective(batch, noise, beta)?;
-        let diverged = |what: String, value: f32| Error::Diverged { what, value, step: self.steps, epoch, batch: number };
+    /// Refuses weights, statistics and moments that are no numbers, which the losses may not show before the next batch.
+    fn check_finite(&self) -> Result<(), Stopped> {
+        let arrays =
+            [("", &self.parameters.values), ("first moment of ", &self.adam.first), ("second moment of ", &self.adam.second)];
+        for (what, arrays) in arrays {
+            for (array, spec) in arrays.iter().zip(self.layout.specs()) {
+                if let Some(&value) = array.iter().find(|x| !x.is_finite()) {
+                    return Err(Stopped::NotFinite(format!("{what}`{}`", spec.name), value));
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// One optimiser step: the objective's terms and the length of the gradient. An error names what is not finite.
+    pub(crate) fn step(&mut self, batch: &Batch, noise: Vec<f32>, beta: f32, learning_rate: f32) -> Result<(Elbo, f32), Stopped> {
+        let Objective { terms, gradients, moments } = self.objective(batch, noise, beta).map_err(Stopped::Device)?;
         for (what, value) in [("reconstruction loss", terms.reconstruction), ("KL divergence", terms.kl)] {
             if !value.is_finite() {
-                return Err(diverged(what.to_owned(), value));
+                return Err(Stopped::NotFinite(what.to_owned(), value));
             }
         }
         for (gradient, spec) in gradients.iter().zip(self.layout.specs()) {
             if let Some(&value) = gradient.iter().flatten().find(|g| !g.is_finite()) {
-                return Err(diverged(format!("gradient of `{}`", spec.name), value));
+                return Err(Stopped::NotFinite(format!("gradient of `{}`", spec.name), value));
             }
         }
+        let squares = gradients.iter().flatten().flatten().map(|&g| f64::from(g) * f64::from(g));
+        let gradient_norm = squares.sum::<f64>().sqrt() as f32;
         self.adam.update(&mut self.parameters, &gradients, learning_rate);
         self.steps += 1;
         let rate = STATISTICS_RATE.max(1.0 / self.steps as f32);
@@ -216,7 +194,7 @@ impl Trainer {
                 }
             }
         }
-        Ok(terms)
+        Ok((terms, gradient_norm))
     }
 
     /// The objective of a batch and its gradients, on the device.
@@ -224,8 +202,8 @@ impl Trainer {
         self.device.objective((&self.layout, &self.cvae), &self.parameters, batch, noise, beta)
     }
 
-    /// Mean terms over `members` as predicted, z drawn from the posterior with the same noise every epoch.
-    pub(crate) fn validate(&self, prepared: &[Prepared], members: &[usize]) -> Option<Elbo> {
+    /// Mean terms over `members` as predicted, z drawn from the posterior with the same noise every epoch; none of no members.
+    pub(crate) fn validate(&self, epoch: usize, prepared: &[Prepared], members: &[usize]) -> Result<Option<Elbo>, Error> {
         let network = ContactNetwork::fold(&self.cvae, &self.network, &self.parameters);
         let term = |&i: &usize| {
             let example = &prepared[i];
@@ -242,13 +220,13 @@ impl Trainer {
             (cross_entropy(&logits, &example.maps, &[0, example.cloud.points.len()]).0, kl)
         };
         let terms: Vec<(f32, f32)> = members.par_iter().map(term).collect();
+        let loss = |(reconstruction, kl): (f32, f32)| reconstruction + kl;
+        if let Some(bad) = terms.iter().position(|&term| !loss(term).is_finite()) {
+            let (what, value, examples) = ("validation loss".to_owned(), loss(terms[bad]), vec![members[bad]]);
+            return Err(Error::Diverged { what, value, step: self.steps, epoch, batch: None, examples });
+        }
         let mean = |sum: f32| sum / terms.len() as f32;
-        (!terms.is_empty())
-            .then(|| Elbo { reconstruction: mean(terms.iter().map(|t| t.0).sum()), kl: mean(terms.iter().map(|t| t.1).sum()) })
-    }
-
-    pub(crate) fn checkpoint(&self, epoch: usize, validation: Option<Elbo>) -> Checkpoint {
-        let (network, device, parameters) = (self.network.clone(), self.device, self.parameters.clone());
-        Checkpoint { kind: self.kind, network, device, epoch, validation, parameters }
+        let elbo = || Elbo { reconstruction: mean(terms.iter().map(|t| t.0).sum()), kl: mean(terms.iter().map(|t| t.1).sum()) };
+        Ok((!terms.is_empty()).then(elbo))
     }
 }

@@ -8,6 +8,7 @@ use safetensors::tensor::TensorView;
 use safetensors::{Dtype, SafeTensors};
 use std::ops::ControlFlow;
 use std::sync::OnceLock;
+use vmao_core::random::Stream;
 use vmao_net::{Checkpoint, ContactNetwork, Device, Error, ModelKind, NetworkConfig, TrainingConfig, train};
 
 fn checkpoint() -> &'static Checkpoint {
@@ -30,7 +31,8 @@ fn rewritten(change: impl Fn(&str, Vec<usize>, Vec<u8>) -> Option<(Dtype, Vec<us
         .filter_map(|(name, view)| change(&name, view.shape().to_vec(), view.data().to_vec()).map(|kept| (name, kept)))
         .collect();
     let views = kept.iter().map(|(name, (dtype, shape, data))| (name, TensorView::new(*dtype, shape.clone(), data).unwrap()));
-    safetensors::serialize(views, None).unwrap()
+    let (_, header) = SafeTensors::read_metadata(&bytes).unwrap();
+    safetensors::serialize(views, header.metadata().clone()).unwrap()
 }
 
 #[track_caller]
@@ -57,9 +59,62 @@ fn a_file_cut_short_or_garbled_is_refused() {
         let error = refused(&bytes[..cut]);
         assert!(matches!(error, Error::NotSafetensors { bytes, .. } if bytes == cut), "{error}");
     }
-    let mut garbled = bytes.clone();
-    garbled[3] = 0xff;
-    assert!(matches!(refused(&garbled), Error::NotSafetensors { .. }));
+    let longer = [&bytes[..], &[0]].concat();
+    assert!(matches!(refused(&longer), Error::NotSafetensors { .. }));
+}
+
+#[test]
+fn no_flipped_bit_of_weights_or_configuration_goes_unnoticed() {
+    let there = checkpoint();
+    let (bytes, config) = (there.to_safetensors().unwrap(), there.config_json().unwrap());
+    let header = 8 + u64::from_le_bytes(bytes[..8].try_into().unwrap()) as usize;
+    let mut stream = Stream::new(7, &[]);
+    let somewhere = (0..300).map(|_| header + stream.index(bytes.len() - header));
+    let places: Vec<usize> = (0..header).step_by(7).chain(somewhere).collect();
+    let mut altered = 0;
+    for place in places {
+        let mut garbled = bytes.clone();
+        garbled[place] ^= 1 << (place % 8);
+        altered += usize::from(matches!(refused(&garbled), Error::Altered { .. }));
+    }
+    assert!(altered > 250, "{altered}: most weights stay finite when a bit flips");
+    // Letters and digits of the configuration; a flip of its white space may mean nothing.
+    let meant = (0..config.len()).filter(|&place| config.as_bytes()[place].is_ascii_alphanumeric());
+    for place in meant {
+        let mut garbled = config.clone().into_bytes();
+        garbled[place] ^= 1;
+        let garbled = String::from_utf8(garbled).unwrap();
+        let error = Checkpoint::from_safetensors(&bytes, &garbled).map(|_| garbled);
+        assert!(error.is_err(), "{error:?}");
+    }
+}
+
+#[test]
+fn hostile_headers_are_refused_without_their_memory() {
+    let with_header = |length: u64, header: &str| [&length.to_le_bytes()[..], header.as_bytes()].concat();
+    let whole = |header: &str| with_header(header.len() as u64, header);
+    let tensor = r#""a":{"dtype":"F32","shape":[1],"data_offsets":[0,4]}"#;
+    let long_name = format!(r#"{{"{}":{{}}}}"#, "x".repeat(1 << 20));
+    for hostile in [
+        with_header(u64::MAX, "{}"),
+        with_header(99_999_999, "{}"),
+        with_header(1 << 40, "{}"),
+        whole(""),
+        whole("{}"),
+        whole("[]"),
+        whole(&"[".repeat(100_000)),
+        whole(&format!(r#"{{"a":{}"#, r#"{"b":"#.repeat(100_000))),
+        whole(r#"{"a":{"dtype":"F32","shape":[4294967296,4294967296,2],"data_offsets":[0,0]}}"#),
+        whole(r#"{"a":{"dtype":"F32","shape":[1],"data_offsets":[4,0]}}"#),
+        whole(r#"{"a":{"dtype":"F32","shape":[18446744073709551615],"data_offsets":[0,18446744073709551615]}}"#),
+        [whole(&format!("{{{tensor},{tensor}}}")), vec![0; 4]].concat(),
+        whole(r#"{"__metadata__":{"vmao":"short"}}"#),
+        whole(r#"{"__metadata__":{"vmao":"digest {\"config\":1}"}}"#),
+        whole(&long_name),
+    ] {
+        let error = refused(&hostile).to_string();
+        assert!(error.len() < 4000, "a message, not the file: {} bytes", error.len());
+    }
 }
 
 #[test]
@@ -113,6 +168,10 @@ fn a_configuration_that_is_not_ours_is_refused() {
         |from: &str, to: &str| Checkpoint::from_safetensors(&bytes, &config.replacen(from, to, 1)).unwrap_err().to_string();
     assert!(with("{", "").starts_with("the checkpoint's configuration cannot be read: "));
     assert!(with("\"kind\"", "\"sort\"").contains("unknown field `sort`"));
-    assert_eq!(with("\"format\": 1", "\"format\": 2"), "format is 2; it must be 1");
+    assert_eq!(with("\"format\": 2", "\"format\": 3"), "format is 3; it must be 2");
+    assert_eq!(
+        with("\"beta\": 0.03", "\"beta\": 0.02"),
+        "config.json has network.beta = 0.02, expected 0.03 as the file beside it says"
+    );
     assert!(with("\"latent_size\": 3", "\"latent_size\": 0").starts_with("latent_size is 0"));
 }

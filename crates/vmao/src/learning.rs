@@ -1,122 +1,65 @@
-//! From a data set to checkpoints: one network for each part, `grasp-0` for the object's first and so on.
+//! Networks on disk and what they are trained on: one network for each part, `grasp-0` for the object's first and so on.
 
 use crate::config::Config;
 use crate::failure::{Failure, OrBadInput};
 use crate::learned_contacts::{LearnedContacts, methods};
-use crate::output::{progress_bar, write_whole};
+use crate::output::{log, write_whole};
 use crate::results::Method;
 use crate::scenes::grasps;
 use anyhow::Context;
-use serde::{Deserialize, Serialize};
+use serde::de::DeserializeOwned;
 use std::fs;
-use std::io::Write;
-use std::ops::ControlFlow;
+use std::io::{Read, Write};
 use std::path::{Path, PathBuf};
-use vmao_core::record::TrialRecord;
-use vmao_net::{Checkpoint, ContactNetwork, Device, EpochReport, Example, ModelKind, train};
+use vmao_core::record::{GraspRecord, TrialRecord};
+use vmao_net::{Checkpoint, ContactNetwork, Example, ModelKind};
 
-/// Largest checkpoint file that is read (bytes).
-const MAX_CHECKPOINT_BYTES: u64 = 256 << 20;
+/// The weights of a network.
+pub(crate) const WEIGHTS: &str = "model.safetensors";
+/// What it is made of.
+pub(crate) const CONFIG: &str = "config.json";
+/// What a training goes on from; gone when it has come to its end.
+pub(crate) const STATE: &str = "state.safetensors";
 
-/// The files of a network.
-const CHECKPOINT_FILES: [&str; 2] = ["model.safetensors", "config.json"];
+/// The most that is read of these files (bytes); a state holds four times the weights.
+const MAX_WEIGHTS_BYTES: u64 = 256 << 20;
+pub(crate) const MAX_STATE_BYTES: u64 = 4 * MAX_WEIGHTS_BYTES;
+const MAX_CONFIG_BYTES: u64 = 1 << 20;
+const MAX_LINES_BYTES: u64 = 256 << 20;
 
-/// One line of `training.jsonl`. Losses in nats; none where there was nothing to measure.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct EpochLine {
-    /// Which grasp step's network.
-    pub grasp: usize,
-    /// From one.
-    pub epoch: usize,
-    /// Cross-entropy on the training examples.
-    pub train_reconstruction: f32,
-    /// KL divergence on the training examples; zero for Top-1.
-    pub train_kl: f32,
-    /// Cross-entropy on the validation examples.
-    pub validation_reconstruction: Option<f32>,
-    /// KL divergence on the validation examples.
-    pub validation_kl: Option<f32>,
-    /// Weight of the divergence.
-    pub beta: f32,
-    /// Adam's step size.
-    pub learning_rate: f32,
+/// The files of a network, and the most that is read of them.
+const FILES: [(&str, u64); 2] = [(WEIGHTS, MAX_WEIGHTS_BYTES), (CONFIG, MAX_CONFIG_BYTES)];
+
+/// The successful grasps of `part`, in the order of the trials.
+fn successes(records: &[TrialRecord], part: usize) -> impl Iterator<Item = (&TrialRecord, &GraspRecord)> {
+    let successful = records.iter().filter(|record| record.outcome.is_success());
+    let grasps = successful.flat_map(|record| record.grasps.iter().map(move |grasp| (record, grasp)));
+    grasps.filter(move |(_, grasp)| usize::from(grasp.contact.part.0) == part)
 }
 
 /// The training examples of `part`: what was seen before the successful grasps of it, and where they touched.
 pub fn examples(records: &[TrialRecord], part: usize) -> Vec<Example> {
-    let successes = records.iter().filter(|record| record.outcome.is_success());
-    successes
-        .flat_map(|record| record.grasps.iter().filter(|grasp| usize::from(grasp.contact.part.0) == part))
-        .map(|grasp| Example {
-            points: grasp.observation.points.clone(),
-            colors: grasp.observation.colors.clone(),
-            contacts: grasp.contact.fingers.map(|point| (grasp.world_from_part * point).coords.map(|x| x as f32).into()),
-        })
-        .collect()
+    let example = |(_, grasp): (_, &GraspRecord)| Example {
+        points: grasp.observation.points.clone(),
+        colors: grasp.observation.colors.clone(),
+        contacts: grasp.contact.fingers.map(|point| (grasp.world_from_part * point).coords.map(|x| x as f32).into()),
+    };
+    successes(records, part).map(example).collect()
 }
 
-/// Trains the networks of all grasp steps of `kind` on `device` into `directory`: `grasp-0/`, `grasp-1/`, … and `training.jsonl`.
-pub fn train_all(
-    config: &Config,
-    kind: ModelKind,
-    records: &[TrialRecord],
-    seed: u64,
-    device: Device,
-    directory: &Path,
-) -> Result<Vec<EpochLine>, Failure> {
-    let grasps = grasps(config)?;
-    let mut lines = Vec::new();
-    let bar = progress_bar(&format!("train {}", kind.title()), (grasps * config.train.epochs) as u64);
-    for grasp in 0..grasps {
-        let examples = examples(records, grasp);
-        let mut on_epoch = |report: &EpochReport| {
-            let line = epoch_line(grasp, report);
-            let validation = line.validation_reconstruction.unwrap_or(line.train_reconstruction);
-            bar.set_prefix(format!("grasp {}, cross-entropy {validation:.2}, KL {:.2}", grasp + 1, line.train_kl));
-            bar.inc(1);
-            lines.push(line);
-            ControlFlow::Continue(())
-        };
-        let seed = vmao_core::random::Stream::new(seed, &[TRAINING, grasp as u64]).bits();
-        let checkpoint = train(kind, &config.network, &config.train, &examples, u64::from(seed), device, &mut on_epoch)
-            .with_context(|| format!("grasp {} of {}, {} successful examples", grasp + 1, kind.title(), examples.len()))?;
-        save(&checkpoint, &grasp_directory(directory, grasp))?;
-    }
-    bar.finish();
-    let path = directory.join("training.jsonl");
-    write_whole(&path, |file| lines.iter().try_for_each(|line| writeln!(file, "{}", serde_json::to_string(line)?)))
-        .with_context(|| path.display().to_string())?;
-    Ok(lines)
+/// The trial of each of [`examples`].
+pub fn trials_of_examples(records: &[TrialRecord], part: usize) -> Vec<u64> {
+    successes(records, part).map(|(record, _)| record.index).collect()
 }
 
-/// Names the stream that training seeds are drawn from.
-const TRAINING: u64 = 1 << 33;
-
-fn epoch_line(grasp: usize, report: &EpochReport) -> EpochLine {
-    EpochLine {
-        grasp,
-        epoch: report.epoch,
-        train_reconstruction: report.training.reconstruction,
-        train_kl: report.training.kl,
-        validation_reconstruction: report.validation.map(|elbo| elbo.reconstruction),
-        validation_kl: report.validation.map(|elbo| elbo.kl),
-        beta: report.beta,
-        learning_rate: report.learning_rate,
-    }
-}
-
-fn grasp_directory(directory: &Path, grasp: usize) -> PathBuf {
+/// The directory of a grasp step's network among those of its kind.
+pub(crate) fn grasp_directory(directory: &Path, grasp: usize) -> PathBuf {
     directory.join(format!("grasp-{grasp}"))
 }
 
-fn save(checkpoint: &Checkpoint, directory: &Path) -> Result<(), Failure> {
-    fs::create_dir_all(directory).with_context(|| directory.display().to_string())?;
-    let files = [("model.safetensors", checkpoint.to_safetensors()?), ("config.json", checkpoint.config_json()?.into_bytes())];
-    for (name, bytes) in files {
-        let path = directory.join(name);
-        write_whole(&path, |file| file.write_all(&bytes)).with_context(|| path.display().to_string())?;
-    }
-    Ok(())
+/// Writes one file of a network, whole or not at all.
+pub(crate) fn save(path: &Path, bytes: &[u8]) -> Result<(), Failure> {
+    Ok(write_whole(path, |file| file.write_all(bytes)).with_context(|| path.display().to_string())?)
 }
 
 /// The kind of a checkpoint directory's networks, and the networks, one for each of `grasps` steps; damaged files are refused.
@@ -143,30 +86,43 @@ pub fn load_methods(models: &Path, config: &Config) -> Result<Vec<(Method, Learn
 }
 
 fn load_one(directory: &Path) -> Result<ContactNetwork, Failure> {
-    let config = String::from_utf8(read(&directory.join("config.json"))?)
-        .with_context(|| format!("{}: not UTF-8", directory.join("config.json").display()))
-        .or_bad_input()?;
-    let checkpoint = Checkpoint::from_safetensors(&read(&directory.join("model.safetensors"))?, &config)
-        .with_context(|| directory.display().to_string())
-        .or_bad_input()?;
+    let checkpoint = load_checkpoint(directory)?;
+    if directory.join(STATE).exists() {
+        let (place, epoch) = (directory.display(), checkpoint.epoch);
+        log(&format!("{place}: training has not come to its end; these are the best weights so far, of epoch {epoch}"));
+    }
     Ok(ContactNetwork::load(&checkpoint))
 }
 
-fn read(path: &Path) -> Result<Vec<u8>, Failure> {
-    let missing = || format!("{}: cannot be read, expected a checkpoint written by `vmao train`", path.display());
-    let length = fs::metadata(path).with_context(missing).or_bad_input()?.len();
-    if length > MAX_CHECKPOINT_BYTES {
-        return Err(Failure::bad_input(format!("{}: {length} bytes, expected at most {MAX_CHECKPOINT_BYTES}", path.display())));
+/// The checkpoint of one grasp step's network.
+pub(crate) fn load_checkpoint(directory: &Path) -> Result<Checkpoint, Failure> {
+    let place = directory.join(CONFIG);
+    let config = String::from_utf8(read(&place, MAX_CONFIG_BYTES)?)
+        .with_context(|| format!("{}: not UTF-8", place.display()))
+        .or_bad_input()?;
+    Checkpoint::from_safetensors(&read(&directory.join(WEIGHTS), MAX_WEIGHTS_BYTES)?, &config)
+        .with_context(|| directory.display().to_string())
+        .or_bad_input()
+}
+
+/// A file of a training of at most `most` bytes.
+pub(crate) fn read(path: &Path, most: u64) -> Result<Vec<u8>, Failure> {
+    let missing = || format!("{}: cannot be read, expected a file written by `vmao train`", path.display());
+    let mut bytes = Vec::new();
+    let file = fs::File::open(path).and_then(|file| file.take(most + 1).read_to_end(&mut bytes));
+    file.with_context(missing).or_bad_input()?;
+    if bytes.len() as u64 > most {
+        return Err(Failure::bad_input(format!("{}: longer than {most} bytes, the most that is read", path.display())));
     }
-    fs::read(path).with_context(missing).or_bad_input()
+    Ok(bytes)
 }
 
 /// Refuses to go on with other networks than those that a run holds.
 pub fn check_same(given: &Path, kept: &Path, grasps: usize) -> Result<(), Failure> {
     for grasp in 0..grasps {
-        for name in CHECKPOINT_FILES {
+        for (name, most) in FILES {
             let (given, kept) = (grasp_directory(given, grasp).join(name), grasp_directory(kept, grasp).join(name));
-            if read(&given)? != read(&kept)? {
+            if read(&given, most)? != read(&kept, most)? {
                 let (given, kept) = (given.display(), kept.display());
                 return Err(Failure::bad_input(format!("{given}: another network than {kept}, which the kept trials ran with")));
             }
@@ -180,32 +136,25 @@ pub fn copy(from: &Path, to: &Path, grasps: usize) -> Result<(), Failure> {
     for grasp in 0..grasps {
         let (source, target) = (grasp_directory(from, grasp), grasp_directory(to, grasp));
         fs::create_dir_all(&target).with_context(|| target.display().to_string())?;
-        for name in CHECKPOINT_FILES {
-            let bytes = read(&source.join(name))?;
-            let path = target.join(name);
-            write_whole(&path, |file| file.write_all(&bytes)).with_context(|| path.display().to_string())?;
+        for (name, most) in FILES {
+            save(&target.join(name), &read(&source.join(name), most)?)?;
         }
     }
     let curves = from.join("training.jsonl");
     if curves.is_file() {
-        let bytes = read(&curves)?;
-        let path = to.join("training.jsonl");
-        write_whole(&path, |file| file.write_all(&bytes)).with_context(|| path.display().to_string())?;
+        save(&to.join("training.jsonl"), &read(&curves, MAX_LINES_BYTES)?)?;
     }
     Ok(())
 }
 
-/// The losses beside a checkpoint; none if there is no `training.jsonl`.
-pub fn curves(directory: &Path) -> Result<Vec<EpochLine>, Failure> {
-    json_lines(&directory.join("training.jsonl"))
+/// The lines of a JSON Lines file, none if there is no such file; a damaged line is refused with its number.
+pub fn json_lines<T: DeserializeOwned>(path: &Path) -> Result<Vec<T>, Failure> {
+    if path.is_file() { parse_lines(path, &read(path, MAX_LINES_BYTES)?) } else { Ok(Vec::new()) }
 }
 
-/// The lines of a JSON Lines file, none if there is no such file; a damaged line is refused with its number.
-pub fn json_lines<T: serde::de::DeserializeOwned>(path: &Path) -> Result<Vec<T>, Failure> {
-    if !path.is_file() {
-        return Ok(Vec::new());
-    }
-    let text = String::from_utf8(read(path)?).with_context(|| format!("{}: not UTF-8", path.display())).or_bad_input()?;
+/// The lines of a JSON Lines file with this content; a damaged line is refused with its number.
+pub(crate) fn parse_lines<T: DeserializeOwned>(path: &Path, content: &[u8]) -> Result<Vec<T>, Failure> {
+    let text = str::from_utf8(content).with_context(|| format!("{}: not UTF-8", path.display())).or_bad_input()?;
     let parse = |(number, line): (usize, &str)| {
         serde_json::from_str(line).with_context(|| format!("{}: line {}", path.display(), number + 1)).or_bad_input()
     };

@@ -36,5 +36,8 @@ pub mod scenes;
 pub mod sharing;
 pub mod significance;
 pub mod statistics;
+pub mod tensorboard;
+pub mod training;
 pub mod training_device;
+pub mod training_log;
 pub use vmao_core::wording;

@@ -4,7 +4,7 @@ use crate::interruption::writing;
 use indicatif::{ProgressBar, ProgressStyle};
 use serde::Serialize;
 use std::{
-    fs::{self, File},
+    fs::{self, File, TryLockError},
     io::{self, BufWriter, Write},
     path::{Path, PathBuf},
 };
@@ -77,6 +77,19 @@ pub fn write_whole(path: &Path, write: impl FnOnce(&mut BufWriter<File>) -> io::
     }
     fs::rename(&partial, path)?;
     File::open(directory)?.sync_all()
+}
+
+/// Holds `directory`, made if need be, for this process alone as long as the file lives; none if another process does.
+///
+/// The system releases it however the process ends.
+pub fn hold(directory: &Path) -> io::Result<Option<File>> {
+    fs::create_dir_all(directory)?;
+    let lock = File::options().create(true).append(true).open(directory.join(".lock"))?;
+    match lock.try_lock() {
+        Ok(()) => Ok(Some(lock)),
+        Err(TryLockError::WouldBlock) => Ok(None),
+        Err(TryLockError::Error(error)) => Err(error),
+    }
 }
 
 #[cfg(test)]

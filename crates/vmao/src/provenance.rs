@@ -4,10 +4,11 @@ use crate::{
     config::{Config, ConfigError},
     json::{Document, DocumentError, JsonPath},
     output::write_whole,
+    wording::listed,
 };
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
-use std::{io, io::Write, path::Path};
+use std::{collections::BTreeSet, io, io::Write, path::Path};
 
 /// The program's version.
 pub const VERSION: &str = env!("CARGO_PKG_VERSION");
@@ -65,6 +66,25 @@ impl RunInfo {
         Ok(())
     }
 
+    /// [`Self::check_same_run`] for the run that is to go on with `config`; names the values that differ.
+    pub fn check_resumes(&self, directory: &Path, config: &Config) -> Result<(), DocumentError> {
+        self.check_same_run(directory).map_err(|mut error| {
+            let there = std::fs::read_to_string(directory.join("config.toml")).ok().and_then(|text| text.parse().ok());
+            let here = config.to_toml().ok().and_then(|text| text.parse().ok());
+            if let (true, Some(there), Some(here)) = (self.differs_in_config(directory), there, here) {
+                let mut differences = Vec::new();
+                differ("", &there, &here, &mut differences);
+                let listed = listed(differences.iter().map(String::as_str));
+                error.message = format!("a run with another configuration: {listed}");
+            }
+            error
+        })
+    }
+
+    fn differs_in_config(&self, directory: &Path) -> bool {
+        Self::load(directory).is_ok_and(|there| there.seed == self.seed && there.config_sha256 != self.config_sha256)
+    }
+
     /// Writes `config.toml`, `run.json` and copies of the files that the configuration names into `directory`.
     pub fn save(&self, directory: &Path, config: &Config) -> io::Result<()> {
         self.save_as(&directory.join("config.toml"), &directory.join("run.json"), config)
@@ -81,6 +101,22 @@ impl RunInfo {
         write_whole(config_file, |file| file.write_all(text.as_bytes()))?;
         let json = serde_json::to_string_pretty(self)?;
         write_whole(run_file, |file| writeln!(file, "{json}"))
+    }
+}
+
+/// Adds every value in which two configurations differ, with what is there and what was asked for.
+fn differ(path: &str, there: &toml::Table, here: &toml::Table, differences: &mut Vec<String>) {
+    let keys: BTreeSet<&String> = there.keys().chain(here.keys()).collect();
+    for key in keys {
+        let name = if path.is_empty() { key.clone() } else { format!("{path}.{key}") };
+        match (there.get(key), here.get(key)) {
+            (Some(toml::Value::Table(there)), Some(toml::Value::Table(here))) => differ(&name, there, here, differences),
+            (there, here) if there == here => {}
+            (there, here) => {
+                let show = |value: Option<&toml::Value>| value.map_or("nothing".to_owned(), ToString::to_string);
+                differences.push(format!("{name} is {} there, {} here", show(there), show(here)));
+            }
+        }
     }
 }
 
@@ -111,6 +147,9 @@ mod tests {
         assert_eq!(info.command, ["vmao", "explore"]);
         run(3, "explore.radius=0.030").0.check_same_run(directory.path()).unwrap();
         let refused = |(info, _): (RunInfo, Config)| info.check_same_run(directory.path()).unwrap_err().to_string();
+        let (info, config) = run(3, "explore.radius=0.04");
+        let named = info.check_resumes(directory.path(), &config).unwrap_err().to_string();
+        assert!(named.ends_with("a run with another configuration: explore.radius is 0.03 there, 0.04 here"), "{named}");
         assert!(refused(run(4, "explore.radius=0.03")).contains("seed (line 9, column 11): a run with seed 3, expected 4"));
         assert!(refused(run(3, "explore.radius=0.04")).contains("config_sha256 (line 10"));
     }

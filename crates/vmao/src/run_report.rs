@@ -6,7 +6,7 @@ use crate::dataset;
 use crate::evaluation::{Evaluation, TrialLine};
 use crate::failure::{Failure, OrBadInput};
 use crate::json::Document;
-use crate::learning::{curves, json_lines, load_methods};
+use crate::learning::{json_lines, load_methods};
 use crate::output::write_whole;
 use crate::provenance::RunInfo;
 use crate::report::{
@@ -14,6 +14,7 @@ use crate::report::{
     TrainingCurve, TrainingEpoch, render,
 };
 use crate::results::{Method, Results};
+use crate::training_log::{EpochLine, curves};
 use anyhow::Context;
 use std::collections::BTreeMap;
 use std::io::Write;
@@ -137,7 +138,7 @@ fn training(models: &Path) -> Result<Vec<TrainingCurve>, Failure> {
         let lines = curves(&models.join(kind.name()))?;
         let grasps = lines.iter().map(|line| line.grasp + 1).max().unwrap_or(0);
         for grasp in 0..grasps {
-            let epoch = |line: &crate::learning::EpochLine| TrainingEpoch {
+            let epoch = |line: &EpochLine| TrainingEpoch {
                 train_reconstruction: f64::from(line.train_reconstruction),
                 validation_reconstruction: line.validation_reconstruction.map_or(f64::NAN, f64::from),
                 kl: if kind == ModelKind::Vmao { f64::from(line.train_kl) } else { f64::NAN },

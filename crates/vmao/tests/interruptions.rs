@@ -207,7 +207,12 @@ fn ctrl_c_stops_demo_train_and_evaluate_too() {
         check_failure(&child.wait_with_output().unwrap(), 130, said);
     };
     let long = [&train[..], &["train.epochs=1000000"]].concat();
-    interrupt(&long, &at("models/top1/run.json"), &["stopped: the data set is kept", "run it again"]);
+    interrupt(
+        &long,
+        &at("models/top1/grasp-0/model.safetensors"),
+        &["stopped: the data set, 0 finished networks", "--resume --out"],
+    );
+    fs::remove_dir_all(&models).unwrap();
     assert!(vmao(&[&train[..], &["train.epochs=1"]].concat()).output().unwrap().status.success());
     let evaluate = ["evaluate", "--checkpoint", &models, "--trials", "100000", "--out", &table];
     interrupt(&evaluate, &at("table/models/top1/grasp-1/config.json"), &["stopped: finished trials are kept", "--resume"]);

@@ -35,7 +35,7 @@ pub(super) fn run(arguments: &ExploreArguments, mut session: Session) -> Result<
     let place = session.out.clone().unwrap_or_else(|| Path::new("runs/explore").to_owned());
     let directory = arguments.shard.map_or_else(|| place.clone(), |share| share.directory(&place));
     if arguments.resume {
-        session.info.check_same_run(&directory).or_bad_input()?;
+        session.info.check_resumes(&directory, &session.config).or_bad_input()?;
     }
     let writer = DatasetWriter::open(&directory)?;
     if !arguments.resume {

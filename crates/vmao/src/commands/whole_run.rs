@@ -6,15 +6,20 @@ use crate::{
     exploration::explore,
     failure::{Failure, OrBadInput},
     interruption::keeps,
-    learning::{load, train_all},
+    learning::load,
     output::log,
     results::Results,
     run_report::write_report,
     scenes::grasps,
+    training::{TrainingRun, go_on},
     training_device::DeviceOptions,
 };
+use anyhow::Context;
 use serde::Serialize;
-use std::path::{Path, PathBuf};
+use std::{
+    fs,
+    path::{Path, PathBuf},
+};
 use vmao_net::ModelKind;
 
 /// Where a whole run's results are.
@@ -55,10 +60,10 @@ pub(super) fn run(
     for kind in ModelKind::ALL {
         if config.evaluate.methods.iter().any(|method| method.model() == kind) {
             let place = directory.join("models").join(kind.name());
-            // The curves are written last: with them, all networks are there.
-            if !(resume && place.join("training.jsonl").exists()) {
-                train_all(config, kind, &records, seed, device, &place)?;
-            }
+            fs::create_dir_all(&place).with_context(|| place.display().to_string())?;
+            session.save(&place)?;
+            let go_on = go_on(&directory.join("config.toml"), seed, &data, kind, &place);
+            TrainingRun { config, kind, records: &records, seed, device, directory: &place, go_on }.train()?;
             models.push(load(&place, grasps(config)?)?);
         }
     }

@@ -1,9 +1,9 @@
 //! Rounds to disk: one process at a time, each round for good.
 
 use super::{DatasetError, RoundFile, check, found_files, io_error, stored, write};
-use crate::output::write_whole;
+use crate::output::{hold, write_whole};
 use std::{
-    fs::{self, File, TryLockError},
+    fs::{self, File},
     io,
     path::{Path, PathBuf},
 };
@@ -20,13 +20,8 @@ pub struct DatasetWriter {
 impl DatasetWriter {
     /// Opens a data set for writing, made if need be; unfinished files of a killed run are removed.
     pub fn open(directory: &Path) -> Result<Self, DatasetError> {
-        fs::create_dir_all(directory).map_err(|source| io_error(directory, source))?;
-        let path = directory.join(".lock");
-        let lock = File::options().create(true).append(true).open(&path).map_err(|source| io_error(&path, source))?;
-        lock.try_lock().map_err(|error| match error {
-            TryLockError::WouldBlock => DatasetError::Locked { directory: directory.to_owned() },
-            TryLockError::Error(source) => io_error(&path, source),
-        })?;
+        let held = hold(directory).map_err(|source| io_error(directory, source))?;
+        let lock = held.ok_or_else(|| DatasetError::Locked { directory: directory.to_owned() })?;
         for entry in fs::read_dir(directory).map_err(|source| io_error(directory, source))? {
             let path = entry.map_err(|source| io_error(directory, source))?.path();
             let name = path.file_name().unwrap_or_default().to_string_lossy();
