@@ -5,6 +5,7 @@
 use crate::{
     config_layers::{self, Layer},
     inputs::{Inputs, is_path},
+    learned_contacts::Draw,
     provenance::sha256_hex,
     results::Method,
     score_config::ScoreConfig,
@@ -165,6 +166,8 @@ pub struct EvaluateConfig {
     pub methods: Vec<Method>,
     /// K, latent codes that best-of-K draws for each grasp.
     pub best_of: usize,
+    /// How finger points are taken from contact maps.
+    pub draw: Draw,
 }
 
 impl Config {

@@ -33,6 +33,7 @@ pub mod robot_meshes;
 pub mod run_report;
 pub mod scenes;
 pub mod score_config;
+pub mod scoring;
 pub mod sharing;
 pub mod statistics;
 pub use vmao_core::wording;

@@ -17,6 +17,7 @@ mod report;
 mod robot;
 mod sample;
 mod scene;
+mod score;
 mod session;
 mod train;
 mod verify;
@@ -57,6 +58,8 @@ enum Command {
     Sample(sample::SampleArguments),
     /// Explored successes of scenes that no training saw, to score models against
     Reference(reference::ReferenceArguments),
+    /// Likelihood, coverage, precision and calibration of trained models on held-out scenes
+    Score(score::ScoreArguments),
     /// Success rates of trained models
     Evaluate(evaluate::EvaluateArguments),
     /// report.html of a run
@@ -119,6 +122,7 @@ fn execute(command: Command, command_line: &[String]) -> Result<(), Failure> {
         Command::Train(arguments) => train::run(&arguments, &session(&arguments.common)?),
         Command::Sample(arguments) => sample::run(&arguments, &session(&arguments.common)?),
         Command::Reference(arguments) => reference::run(&arguments, session(&arguments.common)?),
+        Command::Score(arguments) => score::run(&arguments, session(&arguments.common)?),
         Command::Evaluate(arguments) => evaluate::run(&arguments, session(&arguments.common)?),
         Command::Report(arguments) => report::run(&arguments, &session(&arguments.common)?),
         Command::Verify(arguments) => verify::run(&arguments, &session(&arguments.common)?),

@@ -23,7 +23,7 @@ impl Rank {
 }
 
 /// Masses at which reliability is measured: tenths.
-pub const STEPS: usize = 10;
+pub(super) const STEPS: usize = 10;
 
 /// For the masses 1/10, 2/10, … 1 the share of contacts within the most probable region of that mass; equal to it if calibrated.
 pub fn reliability(ranks: &[Rank]) -> [f64; STEPS] {

@@ -12,7 +12,7 @@ pub fn grip_distance(a: &FingerPoints, b: &FingerPoints) -> f64 {
 }
 
 /// The middle of the two fingers.
-pub fn middle(fingers: &FingerPoints) -> Point3<f64> {
+pub(super) fn middle(fingers: &FingerPoints) -> Point3<f64> {
     center(&fingers[0], &fingers[1])
 }
 

@@ -12,7 +12,7 @@ pub fn log_mean_exp(logs: &[f64]) -> f64 {
 }
 
 /// ln N(z; mean, diag exp(`log_variance`)); the lists have equal length.
-pub fn log_normal(z: &[f32], mean: &[f32], log_variance: &[f32]) -> f64 {
+pub(super) fn log_normal(z: &[f32], mean: &[f32], log_variance: &[f32]) -> f64 {
     let one = |((z, mean), v): ((&f32, &f32), &f32)| {
         let (away, v) = (f64::from(z - mean), f64::from(*v));
         -0.5 * (TAU.ln() + v + away * away / v.exp())
