@@ -42,8 +42,12 @@ impl ScoreConfig {
         for &count in &self.samples {
             within("samples", count as f64, 1.0, 4096.0)?;
         }
-        let counts =
-            [("codes", self.codes), ("likelihoods", self.likelihoods), ("contexts", self.contexts), ("resamples", self.resamples)];
+        let counts = [
+            ("codes", self.codes),
+            ("likelihoods", self.likelihoods),
+            ("contexts", self.contexts),
+            ("resamples", self.resamples),
+        ];
         counts.into_iter().try_for_each(|(key, value)| within(key, value as f64, 1.0, 1e5))
     }
 }

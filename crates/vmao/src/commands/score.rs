@@ -10,8 +10,7 @@ use crate::{
     reference::{Grounds, load_reference, set_name},
     scenes::grasps,
     scoring::{
-        Executed, Models, Rank, Row, Scored, coverage_figure, execute, reliability_figure, scene_figure, score, summarise,
-        table,
+        Executed, Models, Rank, Row, Scored, coverage_figure, execute, reliability_figure, scene_figure, score, summarise, table,
     },
 };
 use anyhow::Context;
@@ -135,13 +134,7 @@ fn write_lines(path: &Path, lines: &[Executed]) -> Result<(), Failure> {
 }
 
 /// Coverage, reliability, and every scene before every grasp.
-fn pictures(
-    directory: &Path,
-    scored: &[Scored],
-    rows: &[Row],
-    config: &Config,
-    shown: usize,
-) -> Result<Vec<PathBuf>, Failure> {
+fn pictures(directory: &Path, scored: &[Scored], rows: &[Row], config: &Config, shown: usize) -> Result<Vec<PathBuf>, Failure> {
     let folder = directory.join("pictures");
     fs::create_dir_all(&folder).with_context(|| folder.display().to_string())?;
     let parts = scored.iter().map(|scene| scene.score.part + 1).max().unwrap_or(0);

@@ -56,7 +56,7 @@ impl Numbered<'_> {
         let network = self.models.network(self.sampler.model()?, part)?;
         let seen = query.observation;
         let scene = network.encode(&seen.points, &seen.colors).ok()?;
-        let map = |k: usize| network.decode(&scene, &code(network, self.seed, part, k)).ok();
+        let map = |k: usize| network.decode(&scene, &code(network, self.seed, self.place, part, k)).ok();
         // Ranking needs all codes; otherwise only the one asked for.
         let (codes, count, at) = match self.sampler {
             Sampler::VmaoRanked => (0..self.codes, self.number + 1, self.number),

@@ -1,7 +1,7 @@
 //! Pictures of a learned distribution, as SVG: contacts on the cloud, coverage against K, reliability.
 
 use super::calibration::{Rank, STEPS, reliability};
-use super::grips::grip_distance;
+use super::grips::{compare, grip_distance};
 use super::measure::Scored;
 use super::samplers::Sampler;
 use super::summary::Row;
@@ -112,8 +112,10 @@ pub fn scene_figure(scene: &Scored, title: &str, count: usize, distance: f64) ->
             let near = scene.references.iter().any(|success| grip_distance(success, grip) <= distance);
             (*grip, if near { GOOD } else { BAD })
         };
-        let grips: Vec<(FingerPoints, &str)> = scene.samples[sampler].iter().take(count).map(judged).collect();
-        panel(&mut body, column + 1, &format!("{}: {}", sampler.title(), grips.len()), &grips);
+        let samples = &scene.samples[sampler][..count.min(scene.samples[sampler].len())];
+        let grips: Vec<(FingerPoints, &str)> = samples.iter().map(judged).collect();
+        let reached = compare(samples, &scene.references, &scene.modes, distance).coverage * modes as f64;
+        panel(&mut body, column + 1, &format!("{}: {}, {reached:.0} modes", sampler.title(), grips.len()), &grips);
     }
     page(WIDTH * (shown.len() + 1) as f64, TOP + view.height + 10.0, &body)
 }

@@ -27,9 +27,7 @@ fn axis_angle(a: &FingerPoints, b: &FingerPoints) -> f64 {
 ///
 /// Two grips are linked if their middles are within `distance` (m) and their closing axes within `angle` (rad).
 pub fn modes(grips: &[FingerPoints], distance: f64, angle: f64) -> Vec<usize> {
-    let linked = |a: &FingerPoints, b: &FingerPoints| {
-        (middle(a) - middle(b)).norm() <= distance && axis_angle(a, b) <= angle
-    };
+    let linked = |a: &FingerPoints, b: &FingerPoints| (middle(a) - middle(b)).norm() <= distance && axis_angle(a, b) <= angle;
     let mut mode = vec![usize::MAX; grips.len()];
     let mut count = 0;
     for first in 0..grips.len() {
@@ -64,6 +62,33 @@ pub struct Comparison {
     pub diversity: Option<f64>,
 }
 
+impl Comparison {
+    /// The mean of each number over those that have it.
+    pub(super) fn mean(all: &[&Self]) -> Self {
+        let of = |number: &dyn Fn(&Self) -> Option<f64>| mean(&all.iter().filter_map(|c| number(c)).collect::<Vec<f64>>());
+        Self {
+            hits: of(&|c| Some(c.hits)).unwrap_or(0.0),
+            coverage: of(&|c| Some(c.coverage)).unwrap_or(0.0),
+            precision: of(&|c| c.precision),
+            diversity: of(&|c| c.diversity),
+        }
+    }
+}
+
+/// The mean of these values; none of nothing.
+pub(super) fn mean(values: &[f64]) -> Option<f64> {
+    (!values.is_empty()).then(|| values.iter().sum::<f64>() / values.len() as f64)
+}
+
+/// Share of the grips within `distance` (m) of another one; none with fewer than two.
+pub(super) fn left_out(grips: &[FingerPoints], distance: f64) -> Option<f64> {
+    let near = |(at, grip): (usize, &FingerPoints)| {
+        let others = grips[..at].iter().chain(&grips[at + 1..]);
+        f64::from(u8::from(others.into_iter().any(|other| grip_distance(grip, other) <= distance)))
+    };
+    if grips.len() < 2 { None } else { mean(&grips.iter().enumerate().map(near).collect::<Vec<f64>>()) }
+}
+
 /// Compares samples with at least one reference grip, whose modes are given; `distance` in m.
 pub fn compare(samples: &[FingerPoints], references: &[FingerPoints], modes: &[usize], distance: f64) -> Comparison {
     let same = |a: &FingerPoints, b: &FingerPoints| grip_distance(a, b) <= distance;
@@ -84,9 +109,8 @@ pub fn compare(samples: &[FingerPoints], references: &[FingerPoints], modes: &[u
 /// Mean distance between the middles of two of these grips (m); none with fewer than two.
 pub fn diversity(samples: &[FingerPoints]) -> Option<f64> {
     let pairs = samples.len() * samples.len().saturating_sub(1) / 2;
-    let to_later = |(index, a): (usize, &FingerPoints)| -> f64 {
-        samples[index + 1..].iter().map(|b| (middle(a) - middle(b)).norm()).sum()
-    };
+    let to_later =
+        |(index, a): (usize, &FingerPoints)| -> f64 { samples[index + 1..].iter().map(|b| (middle(a) - middle(b)).norm()).sum() };
     (pairs > 0).then(|| samples.iter().enumerate().map(to_later).sum::<f64>() / pairs as f64)
 }
 
@@ -131,6 +155,10 @@ mod tests {
         assert!((found.diversity.unwrap() - 0.694 / 6.0).abs() < 1e-12);
         let one = compare(&samples[..1], &references, &known, 0.005);
         assert_eq!((one.hits, one.coverage, one.precision, one.diversity), (0.5, 0.5, Some(1.0), None));
+        assert_eq!(left_out(&references, 0.005), Some(0.5), "0 and 4 mm have each other");
+        assert_eq!(left_out(&references[..1], 0.005), None);
+        let both = Comparison::mean(&[&found, &one]);
+        assert_eq!((both.hits, both.precision, both.diversity), (0.625, Some(0.875), found.diversity));
         let none = compare(&[], &references, &known, 0.005);
         assert_eq!((none.hits, none.coverage, none.precision), (0.0, 0.0, None));
     }

@@ -78,10 +78,8 @@ mod tests {
         let (mean, log_variance) = ([(c / (1.0 + s * s)) as f32], [variance.ln() as f32]);
         let mut stream = Stream::new(4, &[]);
         for codes in [1, 7] {
-            let draws: Vec<[f32; 1]> =
-                (0..codes).map(|_| [mean[0] + (variance.sqrt() * stream.normal()) as f32]).collect();
-            let logs: Vec<f64> =
-                draws.iter().map(|z| conditional(c, z[0], s) + log_weight(z, &mean, &log_variance)).collect();
+            let draws: Vec<[f32; 1]> = (0..codes).map(|_| [mean[0] + (variance.sqrt() * stream.normal()) as f32]).collect();
+            let logs: Vec<f64> = draws.iter().map(|z| conditional(c, z[0], s) + log_weight(z, &mean, &log_variance)).collect();
             assert!((log_mean_exp(&logs) - truth).abs() < 1e-5, "{codes}: {} {truth}", log_mean_exp(&logs));
         }
     }

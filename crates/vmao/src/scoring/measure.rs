@@ -1,7 +1,7 @@
 //! What is measured in one held-out scene, for one grasp of it.
 
 use super::calibration::Rank;
-use super::grips::{Comparison, compare, modes};
+use super::grips::{Comparison, compare, left_out, mean, modes};
 use super::likelihood::{code_information, divergence, log_mean_exp, log_weight};
 use super::samplers::{Apart, Sampler, pairs};
 use crate::failure::Failure;
@@ -39,9 +39,9 @@ impl Models {
     }
 }
 
-/// Code k of the prior for `part`: the same in every scene.
-pub(super) fn code(network: &ContactNetwork, seed: u64, part: usize, k: usize) -> Vec<f32> {
-    latent(network, &mut Stream::new(seed, &[CODES, part as u64, k as u64]))
+/// Code k of the prior for `part` in this place: every scene has codes of its own, or all would share one bad one.
+pub(super) fn code(network: &ContactNetwork, seed: u64, place: Place, part: usize, k: usize) -> Vec<f32> {
+    latent(network, &mut Stream::new(seed, &[CODES, place.set as u64, place.index, part as u64, k as u64]))
 }
 
 /// The stream of the k-th draw of a sampler.
@@ -86,6 +86,8 @@ pub struct SceneScore {
     pub posterior_means: Vec<Vec<f32>>,
     /// By sampler, for each K of the configuration.
     pub comparisons: BTreeMap<Sampler, Vec<Comparison>>,
+    /// Share of the successes within the distance of another one: the precision that samples of the truth would have.
+    pub left_out: Option<f64>,
     /// I(z; point) (nats), mean over fingers and contexts.
     pub information: Option<f64>,
     /// Where the successes' points lie in the models' maps, by model, both fingers.
@@ -117,7 +119,7 @@ struct Context<'a> {
 }
 
 impl<'a> Context<'a> {
-    fn new(models: &Models, grasp: &'a GraspRecord, seed: u64, codes: usize) -> Result<Self, Failure> {
+    fn new(models: &Models, grasp: &'a GraspRecord, (seed, place): (u64, Place), codes: usize) -> Result<Self, Failure> {
         let part = usize::from(grasp.contact.part.0);
         let Observation { points, colors, .. } = &grasp.observation;
         let mut logs = BTreeMap::new();
@@ -125,7 +127,7 @@ impl<'a> Context<'a> {
             let Some(network) = models.network(kind, part) else { continue };
             let scene = network.encode(points, colors)?;
             let count = if kind == ModelKind::Vmao { codes } else { 1 };
-            let all = (0..count).map(|k| network.log_probabilities(&scene, &code(network, seed, part, k)));
+            let all = (0..count).map(|k| network.log_probabilities(&scene, &code(network, seed, place, part, k)));
             logs.insert(kind.name(), all.collect::<Result<Vec<_>, _>>()?);
         }
         Ok(Self { grasp, logs })
@@ -176,16 +178,10 @@ fn evenly<T: Copy>(all: &[T], count: usize) -> Vec<T> {
 }
 
 /// Measures every grasp of every scene that has a success, in the current rayon pool; in the order of places and parts.
-pub fn score(
-    grounds: &Grounds<'_>,
-    reference: &[(Place, Vec<TrialRecord>)],
-    models: &Models,
-) -> Result<Vec<Scored>, Failure> {
+pub fn score(grounds: &Grounds<'_>, reference: &[(Place, Vec<TrialRecord>)], models: &Models) -> Result<Vec<Scored>, Failure> {
     let jobs: Vec<(Place, &[TrialRecord], usize)> = reference
         .iter()
-        .flat_map(|(place, records)| {
-            (0..grounds.scene(*place).object.parts.len()).map(|part| (*place, records.as_slice(), part))
-        })
+        .flat_map(|(place, records)| (0..grounds.scene(*place).object.parts.len()).map(|part| (*place, records.as_slice(), part)))
         .collect();
     let bar = progress_bar("score", jobs.len() as u64);
     let one = |&(place, records, part): &(Place, &[TrialRecord], usize)| {
@@ -225,7 +221,7 @@ fn score_scene(
         let at = match known {
             Some(at) => at,
             None => {
-                contexts.push(Context::new(models, grasp, seed, codes)?);
+                contexts.push(Context::new(models, grasp, (seed, place), codes)?);
                 contexts.len() - 1
             }
         };
@@ -233,8 +229,10 @@ fn score_scene(
         for kind in ModelKind::ALL {
             ranks.entry(kind.name()).or_default().extend(contexts[at].ranks(kind, points));
         }
-        let noise = |k: usize| Stream::new(seed, &[POSTERIOR, place.set as u64, place.index, part as u64, number as u64, k as u64]);
-        let bound = models.network(ModelKind::Vmao, part).map(|network| posterior_bound(network, grasp, points, config.codes, &noise));
+        let noise =
+            |k: usize| Stream::new(seed, &[POSTERIOR, place.set as u64, place.index, part as u64, number as u64, k as u64]);
+        let bound =
+            models.network(ModelKind::Vmao, part).map(|network| posterior_bound(network, grasp, points, config.codes, &noise));
         let bound = bound.transpose()?.flatten();
         let on_part = grasp.observation.labels.iter().filter(|label| **label == PointLabel::Part(part as u16)).count();
         likelihoods.push(Likelihoods {
@@ -254,7 +252,9 @@ fn score_scene(
     let (mut samples, mut information) = (BTreeMap::new(), Vec::new());
     for (number, context) in contexts[..shown].iter().enumerate() {
         let drawn = sample(context, (grounds.seed(), place, part, number), apart, codes);
-        compared.push(drawn.iter().map(|(&sampler, all)| (sampler, comparisons(all, &references, &mode_of, config))).collect());
+        compared.push(
+            drawn.iter().map(|(&sampler, all)| (sampler, comparisons(sampler, all, &references, &mode_of, config))).collect(),
+        );
         let maps = context.maps(ModelKind::Vmao);
         for finger in 0..2 {
             let channels: Vec<&[f32]> = maps.iter().map(|map| map.fingers[finger].as_slice()).collect();
@@ -275,6 +275,7 @@ fn score_scene(
         posterior_means,
         comparisons: averaged(&compared),
         information: mean(&information),
+        left_out: left_out(&references, config.distance),
         ranks,
     };
     let cloud = seen.observation.points.iter().map(|point| in_part(&seen.world_from_part, *point)).collect();
@@ -296,8 +297,7 @@ fn posterior_bound(
     let mut weighted = Vec::with_capacity(codes);
     for k in 0..codes {
         let mut stream = noise(k);
-        let z: Vec<f32> =
-            mean.iter().zip(&log_variance).map(|(m, v)| m + (0.5 * v).exp() * stream.normal() as f32).collect();
+        let z: Vec<f32> = mean.iter().zip(&log_variance).map(|(m, v)| m + (0.5 * v).exp() * stream.normal() as f32).collect();
         let logs = network.log_probabilities(&scene, &z)?;
         weighted.push(logs[0][touched[0]] + logs[1][touched[1]] + log_weight(&z, &mean, &log_variance));
     }
@@ -330,13 +330,21 @@ fn sample(
     drawn
 }
 
-fn comparisons(samples: &[FingerPoints], references: &[FingerPoints], modes: &[usize], config: &ScoreConfig) -> Vec<Comparison> {
-    let first = |&count: &usize| compare(&samples[..count.min(samples.len())], references, modes, config.distance);
-    config.samples.iter().map(first).collect()
-}
-
-fn mean(values: &[f64]) -> Option<f64> {
-    (!values.is_empty()).then(|| values.iter().sum::<f64>() / values.len() as f64)
+/// For each K: the first K samples; of a sampler whose samples are alike and independent, the mean over all groups of K.
+fn comparisons(
+    sampler: Sampler,
+    samples: &[FingerPoints],
+    references: &[FingerPoints],
+    modes: &[usize],
+    config: &ScoreConfig,
+) -> Vec<Comparison> {
+    let of_count = |&count: &usize| {
+        let groups = if sampler.is_independent() { samples.len() / count } else { 1 };
+        let group = |at: usize| &samples[(at * count).min(samples.len())..((at + 1) * count).min(samples.len())];
+        let all: Vec<Comparison> = (0..groups.max(1)).map(|at| compare(group(at), references, modes, config.distance)).collect();
+        Comparison::mean(&all.iter().collect::<Vec<&Comparison>>())
+    };
+    config.samples.iter().map(of_count).collect()
 }
 
 /// The mean over contexts of each number.
@@ -344,13 +352,7 @@ fn averaged(contexts: &[BTreeMap<Sampler, Vec<Comparison>>]) -> BTreeMap<Sampler
     let Some(first) = contexts.first() else { return BTreeMap::new() };
     let average = |sampler: &Sampler, k: usize| {
         let all: Vec<&Comparison> = contexts.iter().filter_map(|context| context.get(sampler)?.get(k)).collect();
-        let of = |number: &dyn Fn(&Comparison) -> Option<f64>| mean(&all.iter().filter_map(|c| number(c)).collect::<Vec<f64>>());
-        Comparison {
-            hits: of(&|c| Some(c.hits)).unwrap_or(0.0),
-            coverage: of(&|c| Some(c.coverage)).unwrap_or(0.0),
-            precision: of(&|c| c.precision),
-            diversity: of(&|c| c.diversity),
-        }
+        Comparison::mean(&all)
     };
     first.iter().map(|(sampler, ks)| (*sampler, (0..ks.len()).map(|k| average(sampler, k)).collect())).collect()
 }

@@ -26,8 +26,7 @@ pub enum Sampler {
 
 impl Sampler {
     /// All, in the order of tables.
-    pub const ALL: [Self; 6] =
-        [Self::VmaoPeak, Self::VmaoDraw, Self::VmaoRanked, Self::Top1Peaks, Self::Top1Draw, Self::Uniform];
+    pub const ALL: [Self; 6] = [Self::VmaoPeak, Self::VmaoDraw, Self::VmaoRanked, Self::Top1Peaks, Self::Top1Draw, Self::Uniform];
 
     /// The name in tables.
     pub fn title(self) -> &'static str {
@@ -38,6 +37,14 @@ impl Sampler {
             Self::Top1Peaks => "Top-1, separated peaks",
             Self::Top1Draw => "Top-1, draws",
             Self::Uniform => "uniform",
+        }
+    }
+
+    /// Whether its samples are independent and alike, so that any K of them say what K samples do.
+    pub fn is_independent(self) -> bool {
+        match self {
+            Self::VmaoPeak | Self::VmaoDraw | Self::Top1Draw | Self::Uniform => true,
+            Self::VmaoRanked | Self::Top1Peaks => false,
         }
     }
 

@@ -37,8 +37,7 @@ pub struct Row {
 }
 
 /// Comparisons of the table: like with like.
-const DIFFERENCES: [(Sampler, Sampler); 2] =
-    [(Sampler::VmaoPeak, Sampler::Top1Peaks), (Sampler::VmaoDraw, Sampler::Top1Draw)];
+const DIFFERENCES: [(Sampler, Sampler); 2] = [(Sampler::VmaoPeak, Sampler::Top1Peaks), (Sampler::VmaoDraw, Sampler::Top1Draw)];
 
 /// A number that a scene may have.
 type Number<T> = (&'static str, fn(&T) -> Option<f64>);
@@ -81,6 +80,7 @@ impl Rows<'_> {
     fn scenes(&mut self, scenes: &[&SceneScore]) {
         self.mean("successes", "reference", None, &each(scenes, |s| Some(s.successes as f64)));
         self.mean("modes", "reference", None, &each(scenes, |s| Some(s.modes as f64)));
+        self.mean("precision of left-out successes", "reference", None, &each(scenes, |s| s.left_out));
         for (method, (measure, number)) in LIKELIHOODS {
             self.mean(measure, method, None, &each(scenes, |s| average(s.likelihoods.iter().filter_map(number))));
         }
@@ -92,9 +92,8 @@ impl Rows<'_> {
         self.push("active units", "V-MAO", None, bootstrap(scenes.len(), self.config.resamples, self.seed, &active));
         for kind in ModelKind::ALL {
             let ranks = |i: usize| scenes[i].ranks.get(kind.name()).map_or(&[][..], Vec::as_slice);
-            let error = |picked: &[usize]| {
-                calibration_error(&picked.iter().flat_map(|&i| ranks(i)).copied().collect::<Vec<Rank>>())
-            };
+            let error =
+                |picked: &[usize]| calibration_error(&picked.iter().flat_map(|&i| ranks(i)).copied().collect::<Vec<Rank>>());
             let estimate = bootstrap(scenes.len(), self.config.resamples, self.seed, &error);
             self.push("calibration error", kind.title(), None, estimate);
         }
@@ -116,7 +115,8 @@ impl Rows<'_> {
     fn executed(&mut self, scenes: &[&Scored], executed: &[Executed]) {
         let count = executed.iter().map(|e| e.number + 1).max();
         let samplers: BTreeSet<Sampler> = executed.iter().map(|e| e.sampler).collect();
-        let shares: Vec<BTreeMap<Sampler, [f64; 2]>> = scenes.iter().map(|scene| carried_out(scene, executed, self.config)).collect();
+        let shares: Vec<BTreeMap<Sampler, [f64; 2]>> =
+            scenes.iter().map(|scene| carried_out(scene, executed, self.config)).collect();
         for (at, measure) in ["executed: success", "executed: mode coverage"].into_iter().enumerate() {
             let number = |share: &BTreeMap<Sampler, [f64; 2]>, sampler| share.get(&sampler).map(|both| both[at]);
             for &sampler in &samplers {
@@ -137,8 +137,7 @@ impl Rows<'_> {
 /// The modes are those of the explored successes together with all samples that succeeded.
 fn carried_out(scene: &Scored, executed: &[Executed], config: &ScoreConfig) -> BTreeMap<Sampler, [f64; 2]> {
     let (place, part) = (scene.score.place, scene.score.part);
-    let here: Vec<&Executed> =
-        executed.iter().filter(|e| e.set == set_name(place.set) && e.scene == place.index).collect();
+    let here: Vec<&Executed> = executed.iter().filter(|e| e.set == set_name(place.set) && e.scene == place.index).collect();
     let good: Vec<(Sampler, FingerPoints)> = here
         .iter()
         .filter(|e| e.outcome.is_success())
@@ -185,10 +184,8 @@ pub fn summarise(scored: &[Scored], executed: &[Executed], config: &ScoreConfig,
     let mut rows = Vec::new();
     let choices = [Some(SETS[0]), Some(SETS[1]), None];
     for (set, part) in choices.into_iter().flat_map(|set| (0..parts).map(move |part| (set, part))) {
-        let chosen: Vec<&Scored> = scored
-            .iter()
-            .filter(|s| s.score.part == part && set.is_none_or(|set| s.score.place.set == set))
-            .collect();
+        let chosen: Vec<&Scored> =
+            scored.iter().filter(|s| s.score.part == part && set.is_none_or(|set| s.score.place.set == set)).collect();
         if chosen.is_empty() {
             continue;
         }
@@ -291,7 +288,8 @@ hit rate  uniform  0.50 [0.25, 0.75]  0.75 [0.50, 1.00]
 
 ";
         let found = table(&rows, &[1, 4]);
-        let squeezed = |text: &str| text.lines().map(|line| line.split_whitespace().collect::<Vec<_>>().join(" ")).collect::<Vec<_>>();
+        let squeezed =
+            |text: &str| text.lines().map(|line| line.split_whitespace().collect::<Vec<_>>().join(" ")).collect::<Vec<_>>();
         let plain = |lines: Vec<String>| lines.into_iter().filter(|line| !line.starts_with('─')).collect::<Vec<_>>();
         assert_eq!(plain(squeezed(&found)), plain(squeezed(expected)), "{found}");
     }
