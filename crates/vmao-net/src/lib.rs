@@ -32,5 +32,5 @@ pub use config::{
     AbstractionConfig, AugmentationConfig, LatentPlacement, ModelKind, NetworkConfig, TrainingConfig, UpConvConfig,
 };
 pub use error::Error;
-pub use network::{ContactNetwork, EncodedScene};
+pub use network::{CodeDistribution, ContactNetwork, EncodedScene};
 pub use training::{Elbo, EpochReport, train};

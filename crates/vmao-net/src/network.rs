@@ -27,6 +27,15 @@ pub struct ContactNetwork {
     logits: FoldedModulated,
 }
 
+/// q(z | scene, contacts): a normal distribution of independent numbers.
+#[derive(Debug, Clone, PartialEq)]
+pub struct CodeDistribution {
+    /// Z numbers.
+    pub mean: Vec<f32>,
+    /// Z numbers.
+    pub log_variance: Vec<f32>,
+}
+
 type Encoder = Vec<(FoldedGroup, usize)>;
 
 /// A cloud that went through the scene encoder once, ready for any number of latent codes.
@@ -116,7 +125,7 @@ impl ContactNetwork {
         Ok(fingers)
     }
 
-    /// Mean and log variance of q(z | scene, contacts), Z numbers each; none without latent code.
+    /// q(z | scene, contacts); none without latent code.
     ///
     /// `points` is the cloud that was encoded, `contacts` where the two fingers touch: world frame (m). Fails on contacts that
     /// are not finite and on a cloud of another length.
@@ -125,7 +134,7 @@ impl ContactNetwork {
         scene: &EncodedScene,
         points: &[[f32; 3]],
         contacts: &[[f32; 3]; FINGERS],
-    ) -> Result<Option<(Vec<f32>, Vec<f32>)>, Error> {
+    ) -> Result<Option<CodeDistribution>, Error> {
         let refuse = |what: &str, found, expected| Err(Error::Input { what: what.to_owned(), found, expected });
         if points.len() != scene.points.len() {
             return refuse("cloud", format!("{} points", points.len()), format!("{}, as were encoded", scene.points.len()));
@@ -133,7 +142,8 @@ impl ContactNetwork {
         if contacts.iter().flatten().any(|x| !x.is_finite()) {
             return refuse("contacts", format!("{contacts:?}"), "finite numbers".to_owned());
         }
-        Ok(self.posterior(scene, &label_maps(&scene.pyramid.sort(points), contacts, self.config.label_sigma)))
+        let maps = label_maps(&scene.pyramid.sort(points), contacts, self.config.label_sigma);
+        Ok(self.posterior(scene, &maps).map(|(mean, log_variance)| CodeDistribution { mean, log_variance }))
     }
 
     fn check_latent(&self, latent: &[f32]) -> Result<(), Error> {

@@ -60,6 +60,15 @@ impl Place {
     }
 }
 
+/// The tries of one place, in order.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ReferenceScene {
+    /// Where.
+    pub place: Place,
+    /// Successes with what was seen, failures without; `index` counts the tries.
+    pub records: Vec<TrialRecord>,
+}
+
 /// The compiled scenes that reference trials and the execution of samples take place in.
 #[derive(Debug)]
 pub struct Grounds<'a> {
@@ -127,7 +136,7 @@ pub fn places(scenes: u64) -> Vec<Place> {
 /// Tries `score.tries` tuples in each of the `score.scenes` scenes of both sets, in the current rayon pool.
 ///
 /// Goes on from the rounds that are in `directory`. The records are the same for any number of threads.
-pub fn explore_reference(grounds: &Grounds<'_>, directory: &Path) -> Result<Vec<(Place, Vec<TrialRecord>)>, Failure> {
+pub fn explore_reference(grounds: &Grounds<'_>, directory: &Path) -> Result<Vec<ReferenceScene>, Failure> {
     let settings = &grounds.config.score;
     let places = places(settings.scenes);
     let bar = progress_bar("reference", places.len() as u64 * settings.tries);
@@ -158,7 +167,7 @@ pub fn explore_reference(grounds: &Grounds<'_>, directory: &Path) -> Result<Vec<
             bar.inc(round.len() as u64);
             records.extend(round);
         }
-        Ok((place, records))
+        Ok(ReferenceScene { place, records })
     };
     let found = places.par_iter().map(explore).collect::<Result<Vec<_>, Failure>>()?;
     bar.finish();
@@ -166,7 +175,7 @@ pub fn explore_reference(grounds: &Grounds<'_>, directory: &Path) -> Result<Vec<
 }
 
 /// The records of a finished reference, by place; a missing round is refused with its name.
-pub fn load_reference(grounds: &Grounds<'_>, directory: &Path) -> Result<Vec<(Place, Vec<TrialRecord>)>, Failure> {
+pub fn load_reference(grounds: &Grounds<'_>, directory: &Path) -> Result<Vec<ReferenceScene>, Failure> {
     let settings = &grounds.config.score;
     let size = grounds.config.explore.round_size.min(settings.tries);
     let mut found = Vec::new();
@@ -182,7 +191,7 @@ pub fn load_reference(grounds: &Grounds<'_>, directory: &Path) -> Result<Vec<(Pl
             let seed = place.trial(grounds.seed).0;
             records.extend(crate::exploration::of_seed(read_round(&file).or_bad_input()?, seed, &file)?);
         }
-        found.push((place, records));
+        found.push(ReferenceScene { place, records });
     }
     Ok(found)
 }

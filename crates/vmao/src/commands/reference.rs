@@ -3,7 +3,7 @@
 use super::{CommonOptions, Session};
 use crate::{
     failure::{Failure, OrBadInput},
-    reference::{Grounds, explore_reference, set_name},
+    reference::{Grounds, ReferenceScene, explore_reference, set_name},
 };
 use serde::Serialize;
 use std::path::{Path, PathBuf};
@@ -53,7 +53,7 @@ pub(super) fn run(arguments: &ReferenceArguments, mut session: Session) -> Resul
     let directory = session.output_directory(default)?;
     let grounds = Grounds::new(&session.config, session.info.seed)?;
     let explored = session.pool()?.install(|| explore_reference(&grounds, &directory))?;
-    let count = |(place, records): &(crate::reference::Place, Vec<vmao_core::record::TrialRecord>)| SceneCount {
+    let count = |ReferenceScene { place, records }: &ReferenceScene| SceneCount {
         set: set_name(place.set),
         scene: place.index,
         tries: records.len(),

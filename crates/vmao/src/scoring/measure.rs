@@ -7,7 +7,7 @@ use super::samplers::{Apart, Sampler, pairs};
 use crate::failure::Failure;
 use crate::learned_contacts::latent;
 use crate::output::progress_bar;
-use crate::reference::{Grounds, Place};
+use crate::reference::{Grounds, Place, ReferenceScene};
 use crate::score_config::ScoreConfig;
 use nalgebra::Point3;
 use rayon::prelude::*;
@@ -18,7 +18,7 @@ use vmao_core::geometry::Pose;
 use vmao_core::observation::{Observation, PointLabel};
 use vmao_core::random::Stream;
 use vmao_core::record::{GraspRecord, TrialRecord};
-use vmao_net::{ContactNetwork, ModelKind};
+use vmao_net::{CodeDistribution, ContactNetwork, ModelKind};
 
 /// Names the streams of this module.
 const CODES: u64 = (1 << 36) + 16;
@@ -237,13 +237,13 @@ fn score_scene(
         let on_part = grasp.observation.labels.iter().filter(|label| **label == PointLabel::Part(part as u16)).count();
         likelihoods.push(Likelihoods {
             vmao_prior: contexts[at].improbability(ModelKind::Vmao, points),
-            vmao_bound: bound.as_ref().map(|bound| bound.0),
+            vmao_bound: bound.as_ref().map(|bound| bound.improbability),
             top1: contexts[at].improbability(ModelKind::Top1, points),
             uniform: 2.0 * (grasp.observation.len() as f64).ln(),
             uniform_on_part: 2.0 * (on_part.max(1) as f64).ln(),
-            divergence: bound.as_ref().map(|bound| bound.1),
+            divergence: bound.as_ref().map(|bound| bound.divergence),
         });
-        posterior_means.extend(bound.map(|bound| bound.2));
+        posterior_means.extend(bound.map(|bound| bound.mean));
     }
     let gripper = grounds.scene(place).robots.iter().map(|robot| robot.gripper.max_opening()).fold(0.0, f64::max);
     let apart = Apart { distance: config.distance, widest: gripper };
@@ -282,18 +282,25 @@ fn score_scene(
     Ok(Some(Scored { score, cloud, labels: seen.observation.labels.clone(), references, modes: mode_of, samples }))
 }
 
-/// Improbability with codes of the posterior, the posterior's divergence, and its mean; none without latent code.
+/// What codes of the posterior say of one success.
+struct PosteriorBound {
+    improbability: f64,
+    divergence: f64,
+    mean: Vec<f32>,
+}
+
+/// None without latent code.
 fn posterior_bound(
     network: &ContactNetwork,
     grasp: &GraspRecord,
     touched: [usize; 2],
     codes: usize,
     noise: &dyn Fn(usize) -> Stream,
-) -> Result<Option<(f64, f64, Vec<f32>)>, Failure> {
+) -> Result<Option<PosteriorBound>, Failure> {
     let Observation { points, colors, .. } = &grasp.observation;
     let scene = network.encode(points, colors)?;
     let contacts = touched.map(|point| points[point]);
-    let Some((mean, log_variance)) = network.recognise(&scene, points, &contacts)? else { return Ok(None) };
+    let Some(CodeDistribution { mean, log_variance }) = network.recognise(&scene, points, &contacts)? else { return Ok(None) };
     let mut weighted = Vec::with_capacity(codes);
     for k in 0..codes {
         let mut stream = noise(k);
@@ -301,7 +308,8 @@ fn posterior_bound(
         let logs = network.log_probabilities(&scene, &z)?;
         weighted.push(logs[0][touched[0]] + logs[1][touched[1]] + log_weight(&z, &mean, &log_variance));
     }
-    Ok(Some((-log_mean_exp(&weighted), divergence(&mean, &log_variance), mean)))
+    let (improbability, divergence) = (-log_mean_exp(&weighted), divergence(&mean, &log_variance));
+    Ok(Some(PosteriorBound { improbability, divergence, mean }))
 }
 
 fn in_part(world_from_part: &Pose, point: [f32; 3]) -> Point3<f64> {
