@@ -69,6 +69,12 @@ impl View {
         Self { right, up, low, scale, height: (high[1] - low[1]) * scale + 30.0 }
     }
 
+    /// Whether a point is within the picture, a margin included.
+    fn holds(&self, point: &Point3<f64>) -> bool {
+        let [x, y] = self.place(point, 0.0);
+        (5.0..=WIDTH - 5.0).contains(&x) && (TOP + 5.0..=TOP + self.height).contains(&y)
+    }
+
     fn place(&self, point: &Point3<f64>, left: f64) -> [f64; 2] {
         let along = |axis: &Vector3<f64>, low: f64| (point.coords.dot(axis) - low) * self.scale + 15.0;
         [left + along(&self.right, self.low[0]), TOP + self.height - along(&self.up, self.low[1])]
@@ -85,17 +91,19 @@ pub fn scene_figure(scene: &Scored, title: &str, count: usize, distance: f64) ->
             PointLabel::Arm(_) | PointLabel::Table => None,
         })
     };
-    let view = View::of(on_object().map(|(point, _)| point));
     let shown = [Sampler::VmaoPeak, Sampler::VmaoDraw, Sampler::Top1Peaks, Sampler::Top1Draw];
     let shown: Vec<Sampler> = shown.into_iter().filter(|sampler| scene.samples.contains_key(sampler)).collect();
+    let samples = |sampler: &Sampler| &scene.samples[sampler][..count.min(scene.samples[sampler].len())];
+    let grips = || scene.references.iter().chain(shown.iter().flat_map(samples)).flatten();
+    let view = View::of(on_object().filter(|(_, own)| *own).map(|(point, _)| point).chain(grips()));
     let mut body = String::new();
     text(&mut body, [15.0, 18.0], title);
     let panel = |body: &mut String, column: usize, heading: &str, grips: &[(FingerPoints, &str)]| {
         let left = column as f64 * WIDTH;
         text(body, [left + 15.0, 36.0], heading);
         for (own, size, color) in [(false, 2.5, "#dddddd"), (true, 3.0, "#b4b4b4")] {
-            let points = on_object().filter(|(_, of_part)| *of_part == own).map(|(point, _)| view.place(point, left));
-            dots(body, points, size, color);
+            let points = on_object().filter(|(point, of_part)| *of_part == own && view.holds(point));
+            dots(body, points.map(|(point, _)| view.place(point, left)), size, color);
         }
         for (fingers, color) in grips {
             let ends = fingers.map(|finger| view.place(&finger, left));
@@ -112,7 +120,7 @@ pub fn scene_figure(scene: &Scored, title: &str, count: usize, distance: f64) ->
             let near = scene.references.iter().any(|success| grip_distance(success, grip) <= distance);
             (*grip, if near { GOOD } else { BAD })
         };
-        let samples = &scene.samples[sampler][..count.min(scene.samples[sampler].len())];
+        let samples = samples(sampler);
         let grips: Vec<(FingerPoints, &str)> = samples.iter().map(judged).collect();
         let reached = compare(samples, &scene.references, &scene.modes, distance).coverage * modes as f64;
         panel(&mut body, column + 1, &format!("{}: {}, {reached:.0} modes", sampler.title(), grips.len()), &grips);
@@ -215,7 +223,7 @@ mod tests {
         let view = View::of(points.iter());
         let [origin, right, high] = [0, 1, 2].map(|i| view.place(&points[i], 0.0));
         assert!(right[0] > origin[0] && high[1] < origin[1] && (high[0] - origin[0]).abs() < 1e-9);
-        assert!(points.iter().map(|p| view.place(p, 0.0)).flatten().all(|x| x > 0.0 && x < WIDTH + TOP));
+        assert!(points.iter().all(|point| view.holds(point)) && !view.holds(&Point3::new(0.2, 0.0, 0.0)));
     }
 
     #[test]
