@@ -1,9 +1,6 @@
 //! `vmao reference` and `vmao score` through the real program: any number of workers, any interruption, what they refuse.
 #![expect(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
-mod program;
-
-use program::check_refusal;
 use serde_json::Value;
 use std::{
     fs,
@@ -20,6 +17,14 @@ fn answer(arguments: &[&str]) -> String {
     let output = vmao(arguments);
     assert!(output.status.success(), "vmao {arguments:?}: {}", String::from_utf8_lossy(&output.stderr));
     String::from_utf8(output.stdout).unwrap()
+}
+
+/// Checks that the program refuses this input with exit code 2, this message and nothing on stdout.
+#[track_caller]
+fn refused(arguments: &[&str], message: &str) {
+    let output = vmao(arguments);
+    let error = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.code() == Some(2) && error.contains(message) && output.stdout.is_empty(), "{error}");
 }
 
 const SMALL: [&str; 6] = ["--set", "trial.order=parallel", "--set", "explore.round_size=2", "--set", "train.epochs=2"];
@@ -80,9 +85,9 @@ fn references_and_scores_are_the_same_for_any_workers_and_after_an_interruption(
         let train = ["train", "--data", &data, "--model", model, "--out", &out];
         answer(&train.iter().chain(&SMALL).copied().collect::<Vec<&str>>());
     }
-    check_refusal(vmao(&with(&score(&two, &at("unfinished"), "1"))), "--resume finishes it");
-    check_refusal(vmao(&with(&reference(&two, &[]))), "--resume goes on with it");
-    check_refusal(vmao(&with(&reference(&two, &["--resume", "--seed", "1"]))), "expected 1 to resume it");
+    refused(&with(&score(&two, &at("unfinished"), "1")), "--resume finishes it");
+    refused(&with(&reference(&two, &[])), "--resume goes on with it");
+    refused(&with(&reference(&two, &["--resume", "--seed", "1"])), "expected 1 to resume it");
     answer(&with(&reference(&two, &["--resume"])));
     assert_eq!(contents(one.as_ref()), contents(two.as_ref()));
 
@@ -107,9 +112,9 @@ fn references_and_scores_are_the_same_for_any_workers_and_after_an_interruption(
     assert!(number(nll, "uniform on the part") < number(nll, "uniform"));
     assert!((number(nll, "V-MAO, prior codes") - number(nll, "Top-1") - number(nll, "V-MAO, prior codes − Top-1")).abs() < 1e-9);
     assert!(first.iter().any(|(name, bytes)| name.ends_with("-grasp-2.svg") && bytes.starts_with(b"<svg")));
-    check_refusal(
-        vmao(&["score", "--models", &format!("{models}/vmao"), &models, "--data", &one, "--out", &at("twice")]),
+    refused(
+        &["score", "--models", &format!("{models}/vmao"), &models, "--data", &one, "--out", &at("twice")],
         "another V-MAO model, expected one of each",
     );
-    check_refusal(vmao(&["score", "--models", &models, "--data", &data, "--out", &at("wrong")]), "round of `vmao reference`");
+    refused(&["score", "--models", &models, "--data", &data, "--out", &at("wrong")], "round of `vmao reference`");
 }

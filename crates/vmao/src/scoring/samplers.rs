@@ -137,6 +137,7 @@ fn separated_peaks(map: &ContactMap, points: &[[f32; 3]], apart: Apart, count: u
 #[cfg(test)]
 mod tests {
     use super::*;
+    use std::slice::from_ref;
 
     /// Four points on a line 1, 2, 3 cm apart from the first, and a map.
     fn line(first: [f32; 4], second: [f32; 4]) -> (Vec<[f32; 3]>, ContactMap) {
@@ -153,17 +154,21 @@ mod tests {
         let (points, map) = line([0.4, 0.3, 0.2, 0.1], [0.05, 0.35, 0.1, 0.5]);
         let apart = Apart { distance: 0.015, widest: 0.025 };
         // 0-3 is too wide; 1-3 (0.15) is best; 0-1 (0.14) is 2 cm from it at finger 2; 1-1 and 2-3 are near one of them.
-        let found = pairs(Sampler::Top1Peaks, &[map.clone()], &points, apart, 3, &stream);
+        let found = pairs(Sampler::Top1Peaks, from_ref(&map), &points, apart, 3, &stream);
         assert_eq!(found, [[1, 3], [0, 1], [2, 1]]);
         let wide = Apart { distance: 1.0, widest: 1.0 };
-        assert_eq!(pairs(Sampler::Top1Peaks, &[map], &points, wide, 3, &stream), [[0, 3]], "all others are near the best");
+        assert_eq!(
+            pairs(Sampler::Top1Peaks, from_ref(&map), &points, wide, 3, &stream),
+            [[0, 3]],
+            "all others are near the best"
+        );
     }
 
     #[test]
     fn draws_follow_the_map_and_depend_on_their_number_only() {
         let (points, map) = line([0.0, 0.5, 0.5, 0.0], [1.0, 0.0, 0.0, 0.0]);
         let apart = Apart { distance: 0.01, widest: 1.0 };
-        let draw = |count| pairs(Sampler::Top1Draw, &[map.clone()], &points, apart, count, &stream);
+        let draw = |count| pairs(Sampler::Top1Draw, from_ref(&map), &points, apart, count, &stream);
         let all = draw(400);
         assert_eq!(draw(7), all[..7]);
         let ones = all.iter().filter(|pair| pair[0] == 1).count();
