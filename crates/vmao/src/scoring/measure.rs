@@ -178,10 +178,12 @@ fn evenly<T: Copy>(all: &[T], count: usize) -> Vec<T> {
 }
 
 /// Measures every grasp of every scene that has a success, in the current rayon pool; in the order of places and parts.
-pub fn score(grounds: &Grounds<'_>, reference: &[(Place, Vec<TrialRecord>)], models: &Models) -> Result<Vec<Scored>, Failure> {
+pub fn score(grounds: &Grounds<'_>, reference: &[ReferenceScene], models: &Models) -> Result<Vec<Scored>, Failure> {
     let jobs: Vec<(Place, &[TrialRecord], usize)> = reference
         .iter()
-        .flat_map(|(place, records)| (0..grounds.scene(*place).object.parts.len()).map(|part| (*place, records.as_slice(), part)))
+        .flat_map(|ReferenceScene { place, records }| {
+            (0..grounds.scene(*place).object.parts.len()).map(|part| (*place, records.as_slice(), part))
+        })
         .collect();
     let bar = progress_bar("score", jobs.len() as u64);
     let one = |&(place, records, part): &(Place, &[TrialRecord], usize)| {
