@@ -41,6 +41,6 @@ pub use course::{Training, train};
 pub use device::Device;
 pub use error::Error;
 pub use lesson::{Lesson, Origin};
-pub use network::{ContactNetwork, EncodedScene};
+pub use network::{CodeDistribution, ContactNetwork, EncodedScene};
 pub use rehearsal::Rehearsal;
 pub use training::{Elbo, EpochReport};

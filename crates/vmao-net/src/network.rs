@@ -3,7 +3,7 @@
 use crate::augment::View;
 use crate::batch::{Prepared, read};
 use crate::checkpoint::Checkpoint;
-use crate::cloud::{check_cloud, features, map_means, posterior_features};
+use crate::cloud::{check_cloud, features, label_maps, map_means, posterior_features};
 use crate::config::{LatentPlacement, ModelKind, NetworkConfig};
 use crate::cvae::{Cvae, LOG_VARIANCE_LIMIT};
 use crate::error::Error;
@@ -25,6 +25,15 @@ pub struct ContactNetwork {
     head: Folded,
     context: Head,
     logits: FoldedModulated,
+}
+
+/// q(z | scene, contacts): a normal distribution of independent numbers.
+#[derive(Debug, Clone, PartialEq)]
+pub struct CodeDistribution {
+    /// Z numbers.
+    pub mean: Vec<f32>,
+    /// Z numbers.
+    pub log_variance: Vec<f32>,
 }
 
 type Encoder = Vec<(FoldedGroup, usize)>;
@@ -93,19 +102,59 @@ impl ContactNetwork {
 
     /// The part of [`ContactNetwork::map`] that depends on the latent code.
     pub fn decode(&self, scene: &EncodedScene, latent: &[f32]) -> Result<ContactMap, Error> {
-        if latent.len() != self.latent_size || latent.iter().any(|z| !z.is_finite()) {
-            return Err(Error::Input {
-                what: "latent code".to_owned(),
-                found: format!("{latent:?}"),
-                expected: format!("{} finite numbers", self.latent_size),
-            });
-        }
+        self.check_latent(latent)?;
         let probabilities = softmax(&self.logits(scene, latent));
         let mut fingers = [0, 1].map(|_| vec![0.0; scene.points.len()]);
         for (row, &place) in probabilities.chunks_exact(FINGERS).zip(&scene.pyramid.order) {
             (0..FINGERS).for_each(|finger| fingers[finger][place as usize] = row[finger]);
         }
         Ok(ContactMap { fingers })
+    }
+
+    /// The logarithms of [`ContactNetwork::decode`]'s probabilities, which do not underflow; a value per finger and point.
+    pub fn log_probabilities(&self, scene: &EncodedScene, latent: &[f32]) -> Result<[Vec<f64>; FINGERS], Error> {
+        self.check_latent(latent)?;
+        let logits = self.logits(scene, latent);
+        let mut fingers = [0, 1].map(|_| vec![0.0; scene.points.len()]);
+        for (finger, logs) in fingers.iter_mut().enumerate() {
+            let own = || logits.iter().skip(finger).step_by(FINGERS).map(|&x| f64::from(x));
+            let largest = own().fold(f64::NEG_INFINITY, f64::max);
+            let total = largest + own().map(|x| (x - largest).exp()).sum::<f64>().ln();
+            own().zip(&scene.pyramid.order).for_each(|(logit, &place)| logs[place as usize] = logit - total);
+        }
+        Ok(fingers)
+    }
+
+    /// q(z | scene, contacts); none without latent code.
+    ///
+    /// `points` is the cloud that was encoded, `contacts` where the two fingers touch: world frame (m). Fails on contacts that
+    /// are not finite and on a cloud of another length.
+    pub fn recognise(
+        &self,
+        scene: &EncodedScene,
+        points: &[[f32; 3]],
+        contacts: &[[f32; 3]; FINGERS],
+    ) -> Result<Option<CodeDistribution>, Error> {
+        let refuse = |what: &str, found, expected| Err(Error::Input { what: what.to_owned(), found, expected });
+        if points.len() != scene.points.len() {
+            return refuse("cloud", format!("{} points", points.len()), format!("{}, as were encoded", scene.points.len()));
+        }
+        if contacts.iter().flatten().any(|x| !x.is_finite()) {
+            return refuse("contacts", format!("{contacts:?}"), "finite numbers".to_owned());
+        }
+        let maps = label_maps(&scene.pyramid.sort(points), contacts, self.config.label_sigma);
+        Ok(self.posterior(scene, &maps).map(|(mean, log_variance)| CodeDistribution { mean, log_variance }))
+    }
+
+    fn check_latent(&self, latent: &[f32]) -> Result<(), Error> {
+        if latent.len() == self.latent_size && latent.iter().all(|z| z.is_finite()) {
+            return Ok(());
+        }
+        Err(Error::Input {
+            what: "latent code".to_owned(),
+            found: format!("{latent:?}"),
+            expected: format!("{} finite numbers", self.latent_size),
+        })
     }
 
     fn encode_ordered(&self, pyramid: Pyramid, cloud: View) -> EncodedScene {

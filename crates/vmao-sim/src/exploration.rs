@@ -51,7 +51,7 @@ impl LabelSet {
     }
 
     /// s ~ T, uniformly over the tuples of one scene.
-    fn draw(&self, scene: usize, stream: &mut Stream) -> ContactTuple {
+    pub fn draw(&self, scene: usize, stream: &mut Stream) -> ContactTuple {
         let known = &self.tuples[scene];
         if known.is_empty() { ContactTuple::new() } else { known[stream.index(known.len())].clone() }
     }

@@ -5,8 +5,10 @@
 use crate::{
     config_layers::{self, Layer},
     inputs::{Inputs, is_path},
+    learned_contacts::Draw,
     provenance::sha256_hex,
     results::Method,
+    score_config::ScoreConfig,
 };
 use serde::{Deserialize, Serialize};
 use std::path::Path;
@@ -68,6 +70,8 @@ pub struct Config {
     pub train: TrainingConfig,
     /// The cells of the table.
     pub evaluate: EvaluateConfig,
+    /// How well a learned distribution is measured.
+    pub score: ScoreConfig,
     /// The files that it names.
     #[serde(skip)]
     pub inputs: Inputs,
@@ -162,6 +166,8 @@ pub struct EvaluateConfig {
     pub methods: Vec<Method>,
     /// K, latent codes that best-of-K draws for each grasp.
     pub best_of: usize,
+    /// How finger points are taken from contact maps.
+    pub draw: Draw,
 }
 
 impl Config {
@@ -321,7 +327,8 @@ impl Config {
         ensure(!evaluate.methods.is_empty(), "evaluate.methods", "no methods", "at least one")?;
         ensure((1..=1000).contains(&evaluate.best_of), "evaluate.best_of", &evaluate.best_of.to_string(), "1 to 1000")?;
         self.network.validate().map_err(|error| format!("network: {error}"))?;
-        self.train.validate().map_err(|error| format!("train: {error}"))
+        self.train.validate().map_err(|error| format!("train: {error}"))?;
+        self.score.check()
     }
 }
 

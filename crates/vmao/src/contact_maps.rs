@@ -1,7 +1,7 @@
 //! Contact maps of one scene for several latent codes, for pictures and other programs.
 
 use crate::failure::Failure;
-use crate::learned_contacts::LearnedContacts;
+use crate::learned_contacts::{LearnedContacts, latent};
 use crate::report::{ContactMapFigure, LatentMap};
 use std::io::{self, Write};
 use vmao_core::observation::Observation;
@@ -23,7 +23,7 @@ pub(crate) fn latent_maps(
     let network = &model.networks[part];
     let scene = network.encode(&seen.points, &seen.colors)?;
     let map = |code| {
-        let latent = model.latent(part, &mut Stream::new(seed, &[SHOWN_LATENTS, code]));
+        let latent = latent(network, &mut Stream::new(seed, &[SHOWN_LATENTS, code]));
         let [finger1, finger2] = network.decode(&scene, &latent)?.fingers;
         Ok(LatentMap { latent, finger1, finger2 })
     };

@@ -3,9 +3,21 @@
 use crate::config::EvaluateConfig;
 use crate::results::Method;
 use nalgebra::Point3;
+use serde::{Deserialize, Serialize};
+use vmao_core::contact::ContactMap;
 use vmao_core::contact_model::{ContactModel, ContactQuery, FingerPoints};
 use vmao_core::random::Stream;
 use vmao_net::{ContactNetwork, ModelKind};
+
+/// How finger points are taken from a contact map.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Draw {
+    /// The most probable point of each finger.
+    Peak,
+    /// A point of each finger drawn with its probability.
+    Sample,
+}
 
 /// One network for each part: p(c₁..c_N) = Π p(cᵢ | the scene after the grasps before). With the first part as root, part i
 /// is grasp i.
@@ -15,6 +27,8 @@ pub struct LearnedContacts {
     pub networks: Vec<ContactNetwork>,
     /// Latent codes drawn for each grasp: one in the paper's method; with more the trial takes the best that it can make.
     pub samples: usize,
+    /// How points are taken from the maps.
+    pub draw: Draw,
 }
 
 /// The configured methods whose networks are among `models`.
@@ -22,37 +36,88 @@ pub fn methods(config: &EvaluateConfig, models: &[(ModelKind, Vec<ContactNetwork
     let with_model = |&method: &Method| {
         let (_, networks) = models.iter().find(|(kind, _)| *kind == method.model())?;
         let samples = if method == Method::BestOfK { config.best_of } else { 1 };
-        Some((method, LearnedContacts { networks: networks.clone(), samples }))
+        Some((method, LearnedContacts { networks: networks.clone(), samples, draw: config.draw }))
     };
     config.methods.iter().filter_map(with_model).collect()
 }
 
-impl LearnedContacts {
-    /// A latent code z ~ N(0, I) for the network of `part`; empty for Top-1.
-    pub fn latent(&self, part: usize, stream: &mut Stream) -> Vec<f32> {
-        (0..self.networks[part].latent_size()).map(|_| stream.normal() as f32).collect()
+/// A latent code z ~ N(0, I) for `network`; empty for Top-1.
+pub fn latent(network: &ContactNetwork, stream: &mut Stream) -> Vec<f32> {
+    (0..network.latent_size()).map(|_| stream.normal() as f32).collect()
+}
+
+/// A point of each finger, drawn with the probabilities of its map.
+pub fn drawn_points(map: &ContactMap, stream: &mut Stream) -> [usize; 2] {
+    [0, 1].map(|finger| stream.weighted(&map.fingers[finger].iter().map(|&p| f64::from(p)).collect::<Vec<f64>>()))
+}
+
+/// The different pairs among these, those of the largest product of probabilities first.
+fn ranked(pairs: impl Iterator<Item = (f32, [usize; 2])>) -> Vec<[usize; 2]> {
+    let mut ranked: Vec<(f32, [usize; 2])> = Vec::new();
+    for (probability, pair) in pairs {
+        if ranked.iter().all(|(_, other)| *other != pair) {
+            ranked.push((probability, pair));
+        }
     }
+    ranked.sort_by(|a, b| b.0.total_cmp(&a.0));
+    ranked.into_iter().map(|(_, pair)| pair).collect()
+}
+
+/// A pair with the product of its probabilities in the map that it is from.
+fn weighed(map: &ContactMap, pair: [usize; 2]) -> (f32, [usize; 2]) {
+    (map.fingers[0][pair[0]] * map.fingers[1][pair[1]], pair)
+}
+
+/// The different peaks of these maps, the most probable first.
+pub fn ranked_peaks(maps: &[ContactMap]) -> Vec<[usize; 2]> {
+    ranked(maps.iter().map(|map| weighed(map, map.peaks())))
 }
 
 impl ContactModel for LearnedContacts {
-    /// The peaks of `samples` maps, the most probable first. Sees the cloud and its colours only: neither labels nor poses.
+    /// Points of `samples` maps, the most probable first. Sees the cloud and its colours only: neither labels nor poses.
     fn propose(&self, query: &ContactQuery<'_>, stream: &mut Stream) -> Vec<FingerPoints> {
         let part = usize::from(query.part.0);
         let Some(network) = self.networks.get(part) else { return Vec::new() };
         let seen = query.observation;
         // A cloud too small for the network is a scene in which it sees nowhere to touch.
         let Ok(scene) = network.encode(&seen.points, &seen.colors) else { return Vec::new() };
-        let mut ranked: Vec<(f32, [usize; 2])> = Vec::with_capacity(self.samples);
+        let mut pairs = Vec::with_capacity(self.samples);
         for _ in 0..self.samples {
-            let Ok(map) = network.decode(&scene, &self.latent(part, stream)) else { continue };
-            let peaks = map.peaks();
-            let probability = map.fingers[0][peaks[0]] * map.fingers[1][peaks[1]];
-            if ranked.iter().all(|(_, other)| *other != peaks) {
-                ranked.push((probability, peaks));
-            }
+            let Ok(map) = network.decode(&scene, &latent(network, stream)) else { continue };
+            let pair = match self.draw {
+                Draw::Peak => map.peaks(),
+                Draw::Sample => drawn_points(&map, stream),
+            };
+            pairs.push(weighed(&map, pair));
         }
-        ranked.sort_by(|a, b| b.0.total_cmp(&a.0));
         let place = |index: usize| Point3::from(seen.points[index].map(f64::from));
-        ranked.into_iter().map(|(_, peaks)| peaks.map(place)).collect()
+        ranked(pairs.into_iter()).into_iter().map(|pair| pair.map(place)).collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn drawn_points_have_the_frequencies_of_the_map() {
+        let map = ContactMap { fingers: [vec![0.2, 0.8, 0.0], vec![0.0, 0.5, 0.5]] };
+        let mut stream = Stream::new(1, &[]);
+        let mut counts = [[0; 3]; 2];
+        for _ in 0..4000 {
+            let pair = drawn_points(&map, &mut stream);
+            (0..2).for_each(|finger| counts[finger][pair[finger]] += 1);
+        }
+        assert!(counts[0][2] == 0 && counts[1][0] == 0);
+        assert!((f64::from(counts[0][0]) / 4000.0 - 0.2).abs() < 0.03 && (f64::from(counts[1][1]) / 4000.0 - 0.5).abs() < 0.03);
+    }
+
+    #[test]
+    fn ranking_drops_repeats_and_puts_the_most_probable_first() {
+        let map = |p: f32, peak: usize| {
+            let channel: Vec<f32> = (0..3).map(|i| if i == peak { p } else { (1.0 - p) / 2.0 }).collect();
+            ContactMap { fingers: [channel.clone(), channel] }
+        };
+        assert_eq!(ranked_peaks(&[map(0.5, 0), map(0.9, 2), map(0.6, 0), map(0.7, 1)]), [[2, 2], [1, 1], [0, 0]]);
     }
 }

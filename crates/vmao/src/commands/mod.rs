@@ -12,11 +12,13 @@ mod object;
 mod object_import;
 mod ocao;
 mod plan;
+mod reference;
 mod report;
 mod reproduce;
 mod robot;
 mod sample;
 mod scene;
+mod score;
 mod session;
 mod train;
 mod verify;
@@ -58,6 +60,10 @@ enum Command {
     Train(train::TrainArguments),
     /// Contact maps of a trained model on scenes that were never explored, as PLY and a page
     Sample(sample::SampleArguments),
+    /// Explored successes of scenes that no training saw, to score models against
+    Reference(reference::ReferenceArguments),
+    /// Likelihood, coverage, precision and calibration of trained models on held-out scenes
+    Score(score::ScoreArguments),
     /// Success rates of trained models
     Evaluate(evaluate::EvaluateArguments),
     /// report.html of a run
@@ -123,6 +129,8 @@ fn execute(command: Command, command_line: &[String]) -> Result<(), Failure> {
         Command::Dataset(arguments) => dataset::run(&arguments, &session(arguments.action.common())?),
         Command::Train(arguments) => train::run(&arguments, &session(&arguments.common)?),
         Command::Sample(arguments) => sample::run(&arguments, &session(&arguments.common)?),
+        Command::Reference(arguments) => reference::run(&arguments, session(&arguments.common)?),
+        Command::Score(arguments) => score::run(&arguments, session(&arguments.common)?),
         Command::Evaluate(arguments) => evaluate::run(&arguments, session(&arguments.common)?),
         Command::Report(arguments) => report::run(&arguments, &session(&arguments.common)?),
         Command::Verify(arguments) => verify::run(&arguments, &session(&arguments.common)?),
