@@ -13,7 +13,7 @@ pub use sawyer::{DEFAULT_SLOT, SLOTS, sawyer};
 use crate::{
     geometry::Pose,
     kinematics::{ChainJoint, SerialChain},
-    shape::Solid,
+    shape::{Shape, Solid},
 };
 use nalgebra::{Matrix3, Point3};
 
@@ -94,6 +94,15 @@ impl Gripper {
     /// The widest thing that fits between the pads (m).
     pub fn max_opening(&self) -> f64 {
         self.closed_gap + 2.0 * self.travel
+    }
+
+    /// Shorter edge of the narrower pad's face (m); zero for pads that touch in a line or point.
+    pub fn pad_width(&self) -> f64 {
+        let width = |finger: &Finger| match finger.pad.shape {
+            Shape::Box { half_extents: [x, _, z] } => 2.0 * x.min(z),
+            Shape::Sphere { .. } | Shape::Capsule { .. } | Shape::Cylinder { .. } | Shape::Convex(_) => 0.0,
+        };
+        self.fingers.iter().map(width).fold(f64::INFINITY, f64::min)
     }
 
     /// How far each finger slides from closed to bring the pads `opening` apart (m; cut to its travel).

@@ -1,6 +1,6 @@
-//! Runs trials of the pliers and writes what their controllers were asked for, so that a peer can be driven in the same way.
+//! Runs trials and writes what their controllers were asked for, so that a peer can be driven in the same way.
 //!
-//! Arguments: order, how many, a folder. Prints one line of JSON a trial; scene.xml and INDEX.bin go to the folder.
+//! Arguments: object, robot, order, how many, a folder. Prints one line of JSON a trial; scene.xml and INDEX.bin go to the folder.
 
 #[path = "../tests/support/mod.rs"]
 mod support;
@@ -8,13 +8,15 @@ mod support;
 use nalgebra::Vector6;
 use std::error::Error;
 use std::path::Path;
+use vmao_core::catalogue::{InstanceSet, item};
 use vmao_core::contact_model::JitteredTuple;
 use vmao_core::geometry::{Pose, position_quaternion};
 use vmao_core::object_centric::part_poses;
 use vmao_core::order::GraspOrder;
 use vmao_core::osc::{GripperGoal, JointVector, OscGains};
+use vmao_core::robots::{panda, sawyer};
 use vmao_sim::targets::{Drive, Targets};
-use vmao_sim::{Recording, run_trial};
+use vmao_sim::{Layout, Recording, Scene, SceneConfig, run_trial};
 
 const SEED: u64 = 0;
 const RADIUS: f64 = 0.008;
@@ -22,12 +24,15 @@ const RADIUS: f64 = 0.008;
 #[expect(clippy::print_stdout, reason = "a measurement is printed")]
 fn main() -> Result<(), Box<dyn Error>> {
     let arguments: Vec<String> = std::env::args().collect();
-    let [_, order, count, folder] = arguments.as_slice() else {
-        return Err("expected three arguments: parallel or sequential, number of trials, folder".into());
+    let [_, object, robot, order, count, folder] = arguments.as_slice() else {
+        return Err("expected five arguments: object, panda or sawyer, parallel or sequential, number of trials, folder".into());
     };
     let order = if order == "parallel" { GraspOrder::Parallel } else { GraspOrder::Sequential };
-    let (_, config) = support::configuration();
-    let scene = support::scene(0);
+    let (scene, config) = support::configuration();
+    let item = item(object, InstanceSet::Train, 0).ok_or("no such object in the catalogue")?;
+    let arms = vec![if robot == "sawyer" { sawyer(1) } else { panda() }; item.object.parts.len()];
+    let layout = if arms.len() > 2 { Layout::Ring } else { scene.layout };
+    let scene = Scene::new(&SceneConfig { layout, ..scene }, arms, item)?;
     std::fs::write(Path::new(folder).join("scene.xml"), &scene.mjcf)?;
     let model = JitteredTuple { tuple: scene.demonstrations[0].clone(), radius: RADIUS };
     let run = |index, recording| run_trial(&scene, &config, &model, order, (SEED, index), recording);

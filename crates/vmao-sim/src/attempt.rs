@@ -41,8 +41,9 @@ pub(crate) enum Draw {
     Noise,
 }
 
-/// Longest time an object may take to come to rest (s), and the speed below which it rests.
+/// Longest time an object may take to come to rest (s), the time in which it falls, and the speed below which it rests then.
 const SETTLE_SECONDS: f64 = 1.0;
+const FALL_SECONDS: f64 = 0.1;
 const REST_SPEED: f64 = 2e-3;
 /// Steps in which the motion after a later grasp is looked at.
 const RESERVE_WAYPOINTS: usize = 4;
@@ -99,9 +100,10 @@ impl<'a> Attempt<'a> {
         }
         simulation.max_steps = config.motion.max_steps;
         let mut settled = Ok(());
-        for tick in 0..(SETTLE_SECONDS / scene.timestep) as usize {
+        for tick in 1..=(SETTLE_SECONDS / scene.timestep) as usize {
             settled = simulation.advance();
-            if settled.is_err() || tick > 50 && simulation.object_speed() < REST_SPEED {
+            let fallen = tick as f64 * scene.timestep > FALL_SECONDS;
+            if settled.is_err() || fallen && simulation.object_speed() < REST_SPEED {
                 break;
             }
         }

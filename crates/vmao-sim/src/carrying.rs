@@ -10,7 +10,7 @@ use crate::task::{goal_errors, threshold_factor};
 use vmao_core::collision::CollisionChecker;
 use vmao_core::geometry::Pose;
 use vmao_core::inverse_kinematics::track;
-use vmao_core::object::ObjectGoal;
+use vmao_core::object::{ObjectGoal, ObjectState};
 use vmao_core::object_centric::{ObjectTrajectory, part_poses};
 use vmao_core::outcome::FailureStage;
 
@@ -19,8 +19,33 @@ const SETTLE_AFTER_MOTION: f64 = 0.3;
 const SETTLE_AT_GOAL: f64 = 0.5;
 /// First leg of the alternative route: straight up by this much (m).
 const LIFT_FIRST: f64 = 0.07;
-/// Joint positions (rad) of each holding arm at each waypoint of a motion.
-type Postures = Vec<Vec<Vec<f64>>>;
+
+/// Where object and arms are, or will be.
+struct Stance {
+    object: ObjectState,
+    /// Joint positions of every arm (rad).
+    joints: Vec<Vec<f64>>,
+}
+
+/// A motion of the object that every arm can make.
+struct CarryPlan {
+    trajectory: ObjectTrajectory,
+    /// Joint positions (rad) of each holding arm at each waypoint.
+    postures: Vec<Vec<Vec<f64>>>,
+    /// Joint positions of every arm at the end (rad).
+    joints: Vec<Vec<f64>>,
+}
+
+impl CarryPlan {
+    fn end(&self) -> Stance {
+        let (trajectory, time) = (&self.trajectory, self.trajectory.duration());
+        let object = ObjectState {
+            world_from_parts: trajectory.part_poses_at(time),
+            joint_positions: trajectory.joint_positions_at(time),
+        };
+        Stance { object, joints: self.joints.clone() }
+    }
+}
 
 impl Attempt<'_> {
     /// Moves the object by object-centric control with all arms that hold it: straight to the step's goal, or up first.
@@ -31,17 +56,16 @@ impl Attempt<'_> {
         let now = self.simulation.object_state();
         up_first.world_from_root = Pose::translation(0.0, 0.0, LIFT_FIRST) * now.world_from_parts[usize::from(goal.root.0)];
         up_first.joint_positions.clone_from(&now.joint_positions);
-        let routes = [vec![goal.clone()], vec![up_first, goal]];
         let mut blocked = Failure::new(FailureStage::NoPlan, "no route");
-        for route in routes {
-            match time(Stage::Planning, || self.plan_carry(&route[0])) {
+        for route in [vec![goal.clone()], vec![up_first, goal]] {
+            match time(Stage::Planning, || self.plan_route(&route)) {
                 Err(failure) => blocked = failure,
-                Ok(_) => {
-                    let legs = route.len();
+                Ok(first) => {
+                    let (mut planned, legs) = (Some(first), route.len());
                     if legs > 1 {
                         self.measuring.detour();
                     }
-                    for (leg, goal) in route.into_iter().enumerate() {
+                    for (leg, goal) in route.iter().enumerate() {
                         let extra = if leg + 1 < legs {
                             0.0
                         } else if last {
@@ -49,7 +73,11 @@ impl Attempt<'_> {
                         } else {
                             SETTLE_AFTER_MOTION
                         };
-                        self.carry_to(&goal, extra)?;
+                        let plan = match planned.take() {
+                            Some(plan) => plan,
+                            None => time(Stage::Planning, || self.plan_carry(&self.stance(), goal))?,
+                        };
+                        self.carry_along(&plan, extra)?;
                     }
                     return Ok(());
                 }
@@ -58,8 +86,26 @@ impl Attempt<'_> {
         Err(blocked)
     }
 
-    fn carry_to(&mut self, goal: &ObjectGoal, extra: f64) -> Result<(), Failure> {
-        let (trajectory, postures) = time(Stage::Planning, || self.plan_carry(goal))?;
+    /// The plan of the route's first leg, if the others can be planned too from where it is to end.
+    fn plan_route(&self, route: &[ObjectGoal]) -> Result<CarryPlan, Failure> {
+        let first = self.plan_carry(&self.stance(), &route[0])?;
+        let mut end = first.end();
+        for goal in &route[1..] {
+            end = self.plan_carry(&end, goal)?.end();
+        }
+        Ok(first)
+    }
+
+    fn stance(&self) -> Stance {
+        let arms = 0..self.scene.robots.len();
+        Stance {
+            object: self.simulation.object_state(),
+            joints: arms.map(|arm| self.simulation.joint_positions(arm).as_slice().to_vec()).collect(),
+        }
+    }
+
+    fn carry_along(&mut self, plan: &CarryPlan, extra: f64) -> Result<(), Failure> {
+        let CarryPlan { trajectory, postures, .. } = plan;
         self.note(format!("move the object, {} held", self.held.len()));
         let hold_from = trajectory.duration() + extra - self.config.thresholds.hold_seconds;
         let (held, motion) = (self.held.clone(), &self.config.motion);
@@ -77,49 +123,50 @@ impl Attempt<'_> {
                 worst = worst.max(threshold_factor(thresholds, &errors));
             }
         };
-        let outcome = time(Stage::Control, || self.simulation.carry(&trajectory, &held, &postures, extra, motion, at_tick));
+        let outcome = time(Stage::Control, || self.simulation.carry(trajectory, &held, postures, extra, motion, at_tick));
         self.errors = errors;
         self.factor = worst;
         outcome
     }
 
-    /// The object's trajectory to `goal` and the joint positions of each holding arm along it, free of collision.
-    fn plan_carry(&self, goal: &ObjectGoal) -> Result<(ObjectTrajectory, Postures), Failure> {
-        let trajectory = self.trajectory(goal.clone());
+    /// The object's trajectory from `start` to `goal`, and all arms' joint positions along it, free of collision.
+    fn plan_carry(&self, start: &Stance, goal: &ObjectGoal) -> Result<CarryPlan, Failure> {
+        let trajectory = self.trajectory_from(start.object.clone(), goal.clone());
         let waypoints = self.waypoints(&trajectory);
-        let mut postures = Vec::new();
+        // Arms that hold nothing stay where they are.
+        let mut ways: Vec<Vec<Vec<f64>>> = start.joints.iter().map(|q| vec![q.clone(); waypoints.len()]).collect();
         for &(arm, part) in &self.held {
             let (index, part) = (usize::from(arm.0), usize::from(part.0));
-            let base_from_world = self.scene.world_from_bases[index].inverse();
-            let part_from_tool = waypoints[0][part].inverse() * self.simulation.tool_pose(index);
+            let (chain, now) = (&self.simulation.chains[index], &start.joints[index]);
+            let world_from_base = self.scene.world_from_bases[index];
+            let part_from_tool = waypoints[0][part].inverse() * world_from_base * chain.tool_pose(now);
+            let base_from_world = world_from_base.inverse();
             let poses: Vec<Pose> = waypoints[1..].iter().map(|parts| base_from_world * parts[part] * part_from_tool).collect();
-            let now = self.simulation.joint_positions(index).as_slice().to_vec();
-            let way = track(&self.simulation.chains[index], &poses, &now, MAX_JOINT_STEP, &ik_settings(0)).map_err(|_where| {
+            let way = track(chain, &poses, now, MAX_JOINT_STEP, &ik_settings(0)).map_err(|_where| {
                 Failure::new(FailureStage::Unreachable, format!("arm {index} cannot follow the object to its goal"))
             })?;
-            postures.push(std::iter::once(now).chain(way).collect::<Vec<_>>());
+            ways[index] = std::iter::once(now.clone()).chain(way).collect();
         }
         let openings: Vec<f64> = (0..self.scene.robots.len()).map(|arm| self.simulation.opening(arm)).collect();
         let world = collision_world(&self.simulation, &openings, &Obstacles::Nothing);
         let mut checker = CollisionChecker::new(&world);
         for waypoint in 1..waypoints.len() {
-            let arms = 0..self.scene.robots.len();
-            let q: Vec<f64> = arms
-                .flat_map(|arm| match self.held.iter().position(|(held, _)| usize::from(held.0) == arm) {
-                    Some(place) => postures[place][waypoint].clone(),
-                    None => self.simulation.joint_positions(arm).as_slice().to_vec(),
-                })
-                .collect();
+            let q: Vec<f64> = ways.iter().flat_map(|way| way[waypoint].iter().copied()).collect();
             if let Some(pair) = checker.check(&q, self.config.grasp.carry_margin / 2.0) {
                 return Err(Failure::new(FailureStage::NoPlan, format!("on the way to the goal {pair}")));
             }
         }
-        Ok((trajectory, postures))
+        let postures = self.held.iter().map(|(arm, _)| ways[usize::from(arm.0)].clone()).collect();
+        let joints = ways.into_iter().filter_map(|mut way| way.pop()).collect();
+        Ok(CarryPlan { trajectory, postures, joints })
     }
 
     /// The object's trajectory from where it is now.
     pub(crate) fn trajectory(&self, goal: ObjectGoal) -> ObjectTrajectory {
-        let now = self.simulation.object_state();
+        self.trajectory_from(self.simulation.object_state(), goal)
+    }
+
+    fn trajectory_from(&self, now: ObjectState, goal: ObjectGoal) -> ObjectTrajectory {
         let parts = part_poses(&self.scene.object, &self.graph, goal.root, &goal.world_from_root, &goal.joint_positions);
         let duration = self.config.motion.duration(&now.world_from_parts, &parts);
         ObjectTrajectory::new(&self.scene.object, &self.graph, now, goal, duration)

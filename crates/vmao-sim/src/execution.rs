@@ -49,16 +49,16 @@ impl MotionConfig {
     }
 }
 
-/// Contacts are examined every this many ticks.
-const WATCH_EVERY: u64 = 10;
+/// Contacts are examined at this interval (s).
+const WATCH_EVERY: f64 = 0.02;
 /// A held part may be without pad contact for this many examinations before it counts as lost.
 const LOST_AFTER: u32 = 5;
 
 /// A part that has moved in the pads by this much (m, rad) since the motion began is not where any plan has it.
 const SLIPPED: [f64; 2] = [0.05, 1.5];
 
-/// Ticks over which the pads' forces are averaged to tell whether a gripper holds its part.
-const HOLD_TICKS: u32 = 25;
+/// Time over which the pads' forces are averaged to tell whether a gripper holds its part (s).
+const HOLD_SECONDS: f64 = 0.05;
 
 impl Simulation<'_> {
     /// Lets time pass with all goals as they are.
@@ -70,6 +70,10 @@ impl Simulation<'_> {
 
     fn ticks(&self, seconds: f64) -> u64 {
         (seconds / self.scene.timestep).round() as u64
+    }
+
+    fn time_to_watch(&self) -> bool {
+        self.steps.is_multiple_of(self.ticks(WATCH_EVERY).max(1))
     }
 
     /// Follows a joint trajectory of all arms (flat) to its end; arms not in `moving` keep their goals.
@@ -95,7 +99,7 @@ impl Simulation<'_> {
                 }
             }
             self.advance()?;
-            if self.steps.is_multiple_of(WATCH_EVERY) {
+            if self.time_to_watch() {
                 self.watch_collisions(moving, motion)?;
             }
         }
@@ -128,12 +132,13 @@ impl Simulation<'_> {
         }
         // Contacts of stiff bodies come and go from one tick to the next: what counts is the mean over a moment.
         let mut pads = vec![[0.0; 2]; grasps.len()];
-        for _ in 0..HOLD_TICKS {
+        let ticks = self.ticks(HOLD_SECONDS).max(1);
+        for _ in 0..ticks {
             self.advance()?;
             for (pads, grasp) in pads.iter_mut().zip(grasps) {
                 let touch = self.touch(grasp.arm, grasp.part);
-                pads[0] += touch.pads[0] / f64::from(HOLD_TICKS);
-                pads[1] += touch.pads[1] / f64::from(HOLD_TICKS);
+                pads[0] += touch.pads[0] / ticks as f64;
+                pads[1] += touch.pads[1] / ticks as f64;
             }
         }
         grasps.iter().zip(pads).try_for_each(|(grasp, pads)| check_hold(grasp, pads, config))
@@ -171,7 +176,7 @@ impl Simulation<'_> {
             wanted = next;
             self.advance()?;
             at_tick(self, time);
-            if self.steps.is_multiple_of(WATCH_EVERY) {
+            if self.time_to_watch() {
                 self.watch_collisions(held, motion)?;
                 self.watch_hold(held, &mut lost)?;
                 self.watch_slip(held, &part_from_tools)?;

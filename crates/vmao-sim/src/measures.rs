@@ -28,9 +28,14 @@ pub struct MotionMeasures {
     pub detours: u32,
 }
 
-/// Ticks between two looks, and looks in a mean of forces: contacts of stiff bodies come and go from tick to tick.
-const LOOK_EVERY: u64 = 5;
+/// Time between two looks (s), and looks in a mean of forces: contacts of stiff bodies come and go from tick to tick.
+const LOOK_EVERY: f64 = 0.01;
 const LOOKS: usize = 5;
+
+/// Ticks between two looks.
+fn look_every(simulation: &Simulation<'_>) -> u64 {
+    ((LOOK_EVERY / simulation.scene.timestep).round() as u64).max(1)
+}
 
 /// One arm's part of the motions.
 #[derive(Debug, Default, Clone)]
@@ -57,7 +62,8 @@ pub(crate) struct Measuring {
 impl Measuring {
     /// Takes in the paths of the arms `holding` after a tick in which they moved the object.
     pub(crate) fn follow(&mut self, simulation: &Simulation<'_>, holding: &[usize]) {
-        if !simulation.steps.is_multiple_of(LOOK_EVERY) {
+        let every = look_every(simulation);
+        if !simulation.steps.is_multiple_of(every) {
             return;
         }
         self.arms.resize(simulation.scene.arms.len(), Way::default());
@@ -66,11 +72,11 @@ impl Measuring {
             let (hand, joints) = (simulation.tool_pose(arm).translation.vector, simulation.joint_positions(arm));
             // Between two motions nobody looks.
             if let Some((before, last_hand, last_joints)) = way.last
-                && before + LOOK_EVERY == steps
+                && before + every == steps
             {
                 let step = (hand - last_hand).norm();
                 way.length += step;
-                let speed = step / (LOOK_EVERY as f64 * simulation.scene.timestep);
+                let speed = step / (every as f64 * simulation.scene.timestep);
                 self.measures.hand_speed = self.measures.hand_speed.max(speed);
                 self.measures.joint_travel += (joints - last_joints).abs().sum();
             }
@@ -85,7 +91,7 @@ impl Measuring {
 
     /// Takes in the state after a tick in which the arms `holding`, all there are, moved the parts toward `wanted` poses.
     pub(crate) fn look(&mut self, simulation: &Simulation<'_>, holding: &[usize], wanted: impl FnOnce() -> Vec<Pose>) {
-        if !simulation.steps.is_multiple_of(LOOK_EVERY) {
+        if !simulation.steps.is_multiple_of(look_every(simulation)) {
             return;
         }
         for (part, wanted) in simulation.object_state().world_from_parts.iter().zip(wanted()) {

@@ -44,7 +44,7 @@ pub(crate) fn scene(
     meshes: &[LinkMesh],
 ) -> String {
     let mut xml = String::new();
-    header(&mut xml, config);
+    header(&mut xml, config, robots);
     xml.push_str(&link_meshes::assets(meshes));
     for part in &object.parts {
         hulls(&mut xml, part.solids.iter().enumerate().map(|(index, solid)| (part_solid_name(&part.name, index), solid)));
@@ -74,7 +74,7 @@ pub(crate) fn scene(
 /// Arms among obstacles that do not move, and nothing else.
 pub(crate) fn arms_among(config: &SceneConfig, robots: &[RobotModel], bases: &[Pose], obstacles: &[Obstacle]) -> String {
     let mut xml = String::new();
-    header(&mut xml, config);
+    header(&mut xml, config, robots);
     hulls(&mut xml, obstacles.iter().enumerate().map(|(index, obstacle)| (obstacle_name(index), &obstacle.solid)));
     line(&mut xml, "<worldbody>");
     for (index, obstacle) in obstacles.iter().enumerate() {
@@ -94,10 +94,13 @@ fn line(xml: &mut String, text: &str) {
     xml.push('\n');
 }
 
-fn header(xml: &mut String, config: &SceneConfig) {
+fn header(xml: &mut String, config: &SceneConfig, robots: &[RobotModel]) {
     line(xml, r#"<mujoco model="vmao">"#);
     line(xml, r#"<compiler angle="radian" autolimits="true"/>"#);
-    let SceneConfig { timestep, friction_impedance_ratio, noslip_iterations, noslip_tolerance, sleep_tolerance, .. } = config;
+    let SceneConfig { timestep, friction_impedance_ratio, noslip_tolerance, sleep_tolerance, .. } = config;
+    // Wide pads hold by where they press: with them noslip would be half of a step for nothing.
+    let narrow = robots.iter().any(|robot| robot.gripper.pad_width() < config.noslip_pad_width);
+    let noslip_iterations = if narrow { config.noslip_iterations } else { 0 };
     let sleep = if *sleep_tolerance > 0.0 { "enable" } else { "disable" };
     line(
         xml,

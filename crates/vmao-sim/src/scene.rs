@@ -54,8 +54,10 @@ pub struct SceneConfig {
     pub timestep: f64,
     /// MuJoCo's `impratio`: how much stiffer friction is than the normal direction.
     pub friction_impedance_ratio: f64,
-    /// MuJoCo's `noslip_iterations`.
+    /// MuJoCo's `noslip_iterations` where a gripper's pad is narrower than `noslip_pad_width`; elsewhere none.
     pub noslip_iterations: u32,
+    /// Width of pads below which what they hold turns unless noslip keeps it (m).
+    pub noslip_pad_width: f64,
     /// MuJoCo's `noslip_tolerance`: noslip ends when an iteration improves by less.
     pub noslip_tolerance: f64,
     /// MuJoCo's `sleep_tolerance` (m/s): an object at rest is not simulated until something touches it; 0 for never.

@@ -5,10 +5,10 @@ mod support;
 
 use mujoco_rs::wrappers::mj_data::MjData;
 use mujoco_rs::wrappers::mj_model::{MjModel, MjtEq, MjtJoint, MjtObjBase, MjtTrn};
-use support::{configuration, demonstrated_trial, failed_at, first_successes, scene, scene_with, slippery};
+use support::{configuration, demonstrated_trial, failed_at, first_successes, mixed_scene, scene, scene_with, slippery};
 use vmao_core::order::GraspOrder;
 use vmao_core::outcome::FailureStage;
-use vmao_core::robots::panda;
+use vmao_core::robots::{DEFAULT_SLOT, panda, sawyer};
 use vmao_sim::{SceneConfig, TrialConfig};
 
 /// Friction at which the grasps must fail.
@@ -118,6 +118,16 @@ fn contacts_are_on_between_everything_that_may_touch() {
         assert_eq!((model.geom_contype()[geom], model.geom_conaffinity()[geom]), (1, 1), "{name}");
         assert_eq!((model.geom_margin()[geom], model.geom_gap()[geom]), (0.0, 0.0), "{name} acts at a distance");
     }
+}
+
+#[test]
+fn narrow_pads_get_the_solver_that_keeps_things_from_turning_in_them() {
+    let (config, _) = configuration();
+    let iterations = |mjcf: &str| MjModel::from_xml_string(mjcf).unwrap().opt().noslip_iterations;
+    assert!(panda().gripper.pad_width() > config.noslip_pad_width);
+    assert!(sawyer(DEFAULT_SLOT).gripper.pad_width() < config.noslip_pad_width && config.noslip_iterations > 0);
+    assert_eq!(iterations(&scene(0).mjcf), 0, "two Pandas");
+    assert_eq!(u32::try_from(iterations(&mixed_scene().mjcf)), Ok(config.noslip_iterations), "one Sawyer is enough");
 }
 
 #[test]

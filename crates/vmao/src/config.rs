@@ -286,6 +286,7 @@ impl Config {
         within("scene.base_distance", scene.base_distance, 0.2, 2.0)?;
         within("scene.base_spacing", scene.base_spacing, 0.2, 2.0)?;
         within("scene.timestep", scene.timestep, 1e-4, 5e-3)?;
+        within("scene.noslip_pad_width", scene.noslip_pad_width, 0.0, 1.0)?;
         within("scene.noslip_tolerance", scene.noslip_tolerance, 0.0, 1.0)?;
         within("scene.sleep_tolerance", scene.sleep_tolerance, 0.0, 0.1)?;
         within("scene.friction_impedance_ratio", scene.friction_impedance_ratio, 1.0, 1000.0)?;
