@@ -94,6 +94,10 @@ fn line(xml: &mut String, text: &str) {
     xml.push('\n');
 }
 
+/// Friction of a joint that does not give way: with MuJoCo's own 0.9 a laptop's screen sinks at 6° a second, with this at 0.06°. Stiffer
+/// still, one of 300 objects dropped on the table jumps.
+const STIFF_FRICTION: &str = r#"solimpfriction="0.999 0.999 0.001 0.5 2""#;
+
 fn header(xml: &mut String, config: &SceneConfig, robots: &[RobotModel]) {
     line(xml, r#"<mujoco model="vmao">"#);
     line(xml, r#"<compiler angle="radian" autolimits="true"/>"#);
@@ -232,7 +236,7 @@ fn joint_element(xml: &mut String, joint: &Joint, from: PartId) {
     line(
         xml,
         &format!(
-            r#"<joint name="{}" type="{kind}" pos="{} {} {}" axis="{} {} {}"{limits} damping="{}" frictionloss="{}" armature="0.0001"/>"#,
+            r#"<joint name="{}" type="{kind}" pos="{} {} {}" axis="{} {} {}"{limits} damping="{}" frictionloss="{}" {STIFF_FRICTION} armature="0.0001"/>"#,
             part_name(&joint.name),
             joint.anchor.x,
             joint.anchor.y,

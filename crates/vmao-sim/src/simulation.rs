@@ -7,6 +7,7 @@ use crate::recorder::Recorder;
 use crate::scene::{Owner, Scene};
 use crate::targets::Targets;
 use nalgebra::Vector6;
+use std::f64::consts::TAU;
 use vmao_core::contact::{ArmId, PartId};
 use vmao_core::geometry::Pose;
 use vmao_core::kinematics::SerialChain;
@@ -192,9 +193,10 @@ impl<'s> Simulation<'s> {
         let mut joint_positions = joint_positions(object, &world_from_parts);
         let mut coordinate = 0;
         for (address, joint) in self.scene.joint_addresses.iter().zip(&object.joints) {
-            // The simulator counts the turns of a hinge; poses alone cannot tell them apart.
-            if let (Some((qpos, _)), JointKind::Revolute | JointKind::Prismatic) = (address, joint.kind) {
-                joint_positions[coordinate] = self.data.qpos()[*qpos];
+            // The simulator counts the turns of a hinge, which poses alone cannot tell apart; its angle is a step ahead of the poses.
+            if let (Some((qpos, _)), JointKind::Revolute) = (address, joint.kind) {
+                let angle = &mut joint_positions[coordinate];
+                *angle += TAU * ((self.data.qpos()[*qpos] - *angle) / TAU).round();
             }
             coordinate += joint.kind.coordinates();
         }
