@@ -118,7 +118,9 @@ fn rollouts(evaluation: &Evaluation<'_>, lines: &[TrialLine]) -> Vec<RolloutFigu
         shown.extend(lines.iter().find(|line| line.order == order && line.method == Method::Vmao && line.outcome.is_success()));
     }
     let failed = lines.iter().filter(|line| !line.outcome.is_success());
-    shown.extend(failed.max_by_key(|line| (line.method == Method::Vmao, line.steps, std::cmp::Reverse(line.index))));
+    // One that ended before anything moved has nothing to play, whoever chose its contacts.
+    let telling = |line: &&TrialLine| (line.steps, line.method == Method::Vmao, std::cmp::Reverse(line.index));
+    shown.extend(failed.max_by_key(telling));
     let figure = |line: &TrialLine| {
         let rollout = evaluation.trial(line.order, line.method, line.index, Recording::On)?.rollout?;
         let what = match line.outcome {
