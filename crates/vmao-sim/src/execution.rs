@@ -72,8 +72,13 @@ impl Simulation<'_> {
         (seconds / self.scene.timestep).round() as u64
     }
 
+    /// Ticks of an interval (s), one at least.
+    pub(crate) fn interval(&self, seconds: f64) -> u64 {
+        self.ticks(seconds).max(1)
+    }
+
     fn time_to_watch(&self) -> bool {
-        self.steps.is_multiple_of(self.ticks(WATCH_EVERY).max(1))
+        self.steps.is_multiple_of(self.interval(WATCH_EVERY))
     }
 
     /// Follows a joint trajectory of all arms (flat) to its end; arms not in `moving` keep their goals.
@@ -132,7 +137,7 @@ impl Simulation<'_> {
         }
         // Contacts of stiff bodies come and go from one tick to the next: what counts is the mean over a moment.
         let mut pads = vec![[0.0; 2]; grasps.len()];
-        let ticks = self.ticks(HOLD_SECONDS).max(1);
+        let ticks = self.interval(HOLD_SECONDS);
         for _ in 0..ticks {
             self.advance()?;
             for (pads, grasp) in pads.iter_mut().zip(grasps) {

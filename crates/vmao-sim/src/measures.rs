@@ -32,11 +32,6 @@ pub struct MotionMeasures {
 const LOOK_EVERY: f64 = 0.01;
 const LOOKS: usize = 5;
 
-/// Ticks between two looks.
-fn look_every(simulation: &Simulation<'_>) -> u64 {
-    ((LOOK_EVERY / simulation.scene.timestep).round() as u64).max(1)
-}
-
 /// One arm's part of the motions.
 #[derive(Debug, Default, Clone)]
 struct Way {
@@ -62,7 +57,7 @@ pub(crate) struct Measuring {
 impl Measuring {
     /// Takes in the paths of the arms `holding` after a tick in which they moved the object.
     pub(crate) fn follow(&mut self, simulation: &Simulation<'_>, holding: &[usize]) {
-        let every = look_every(simulation);
+        let every = simulation.interval(LOOK_EVERY);
         if !simulation.steps.is_multiple_of(every) {
             return;
         }
@@ -91,7 +86,7 @@ impl Measuring {
 
     /// Takes in the state after a tick in which the arms `holding`, all there are, moved the parts toward `wanted` poses.
     pub(crate) fn look(&mut self, simulation: &Simulation<'_>, holding: &[usize], wanted: impl FnOnce() -> Vec<Pose>) {
-        if !simulation.steps.is_multiple_of(look_every(simulation)) {
+        if !simulation.steps.is_multiple_of(simulation.interval(LOOK_EVERY)) {
             return;
         }
         for (part, wanted) in simulation.object_state().world_from_parts.iter().zip(wanted()) {

@@ -1,9 +1,9 @@
 //! Finished trials of an unfinished table, so that a stopped evaluation goes on where it was.
 
 use crate::evaluation::TrialLine;
-use crate::failure::{Failure, OrBadInput};
+use crate::failure::Failure;
 use crate::interruption::writing;
-use crate::learning::json_lines;
+use crate::learning::{MAX_LINES_BYTES, json_lines, parse_lines, read, whole_lines};
 use anyhow::Context;
 use std::fs::{self, File, OpenOptions};
 use std::io::Write;
@@ -24,11 +24,11 @@ impl KeptTrials {
         let context = || path.display().to_string();
         let mut lines = Vec::new();
         if resume && path.exists() {
-            // A kill may have cut the last line; its trial runs again.
-            let bytes = fs::read(&path).with_context(context).or_bad_input()?;
-            let whole = bytes.iter().rposition(|&byte| byte == b'\n').map_or(0, |end| end + 1);
-            OpenOptions::new().write(true).open(&path).and_then(|file| file.set_len(whole as u64)).with_context(context)?;
-            lines = json_lines(&path)?;
+            // The trial of a line that was cut runs again.
+            let bytes = read(&path, MAX_LINES_BYTES)?;
+            let whole = whole_lines(&bytes);
+            lines = parse_lines(&path, whole)?;
+            OpenOptions::new().write(true).open(&path).and_then(|file| file.set_len(whole.len() as u64)).with_context(context)?;
         } else {
             File::create(&path).with_context(context)?;
             if resume {

@@ -25,7 +25,7 @@ pub(crate) const STATE: &str = "state.safetensors";
 const MAX_WEIGHTS_BYTES: u64 = 256 << 20;
 pub(crate) const MAX_STATE_BYTES: u64 = 4 * MAX_WEIGHTS_BYTES;
 const MAX_CONFIG_BYTES: u64 = 1 << 20;
-const MAX_LINES_BYTES: u64 = 256 << 20;
+pub(crate) const MAX_LINES_BYTES: u64 = 256 << 20;
 
 /// The files of a network, and the most that is read of them.
 const FILES: [(&str, u64); 2] = [(WEIGHTS, MAX_WEIGHTS_BYTES), (CONFIG, MAX_CONFIG_BYTES)];
@@ -150,6 +150,11 @@ pub fn copy(from: &Path, to: &Path, grasps: usize) -> Result<(), Failure> {
 /// The lines of a JSON Lines file, none if there is no such file; a damaged line is refused with its number.
 pub fn json_lines<T: DeserializeOwned>(path: &Path) -> Result<Vec<T>, Failure> {
     if path.is_file() { parse_lines(path, &read(path, MAX_LINES_BYTES)?) } else { Ok(Vec::new()) }
+}
+
+/// All lines that came to their end: a kill may have cut the last one.
+pub(crate) fn whole_lines(content: &[u8]) -> &[u8] {
+    &content[..content.iter().rposition(|&byte| byte == b'\n').map_or(0, |newline| newline + 1)]
 }
 
 /// The lines of a JSON Lines file with this content; a damaged line is refused with its number.

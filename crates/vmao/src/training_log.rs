@@ -5,7 +5,7 @@
 
 use crate::failure::{Failure, OrBadInput};
 use crate::interruption::writing;
-use crate::learning::{grasp_directory, json_lines, parse_lines};
+use crate::learning::{grasp_directory, json_lines, parse_lines, whole_lines};
 use crate::output::write_whole;
 use crate::tensorboard::{header, scalars};
 use anyhow::Context;
@@ -95,8 +95,7 @@ impl TrainingLog {
             Err(error) if error.kind() == io::ErrorKind::NotFound => Vec::new(),
             text => text.with_context(|| path.display().to_string()).or_bad_input()?,
         };
-        let end = text.iter().rposition(|&byte| byte == b'\n').map_or(0, |newline| newline + 1);
-        let mut lines: Vec<EpochLine> = parse_lines(&path, &text[..end])?;
+        let mut lines: Vec<EpochLine> = parse_lines(&path, whole_lines(&text))?;
         lines.sort_by_key(|line| (line.grasp, line.epoch));
         Ok(Self { directory: directory.to_owned(), lines, open: None })
     }
