@@ -39,10 +39,68 @@ pub struct ContactMap {
     pub fingers: [Vec<f32>; 2],
 }
 
+/// Points with less than this share of the greatest probability are no peaks, whatever lies about them.
+const LEAST_PEAK: f32 = 0.1;
+
 impl ContactMap {
-    /// The most probable point of each finger. Ties go to the lower index.
-    pub fn peaks(&self) -> [usize; 2] {
-        let peak = |channel: &[f32]| (0..channel.len()).fold(0, |best, i| if channel[i] > channel[best] { i } else { best });
-        [peak(&self.fingers[0]), peak(&self.fingers[1])]
+    /// The probability about each of `points` (m), for each finger: mᵢ = Σⱼ pⱼ max(0, 1 − ‖xᵢ − xⱼ‖²/r²), r > 0.
+    ///
+    /// A point's own probability is that of the surface it stands for, more where the cloud is thin; what lies within a
+    /// radius does not depend on the cloud. Zero where the point's own is below a tenth of the greatest.
+    pub fn masses(&self, points: &[[f32; 3]], radius: f32) -> [Vec<f32>; 2] {
+        self.fingers.each_ref().map(|channel| {
+            let least = LEAST_PEAK * channel.iter().copied().fold(0.0, f32::max);
+            let near = |x: &[f32; 3], y: &[f32; 3]| {
+                let squared = (0..3).map(|axis| (x[axis] - y[axis]) * (x[axis] - y[axis])).sum::<f32>();
+                (1.0 - squared / (radius * radius)).max(0.0)
+            };
+            let about = |x: &[f32; 3]| channel.iter().zip(points).map(|(p, y)| p * near(x, y)).sum();
+            channel.iter().zip(points).map(|(&p, x)| if p >= least { about(x) } else { 0.0 }).collect()
+        })
+    }
+
+    /// The point of each finger about which most of its probability lies, [`Self::masses`]. Ties go to the lower index.
+    pub fn peaks(&self, points: &[[f32; 3]], radius: f32) -> [usize; 2] {
+        self.masses(points, radius).map(|masses| largest(&masses))
+    }
+}
+
+/// The index of the largest value, the lowest of equals.
+pub fn largest(values: &[f32]) -> usize {
+    (0..values.len()).fold(0, |best, i| if values[i] > values[best] { i } else { best })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_peak_lies_where_the_surface_has_most_whatever_the_density_of_points() {
+        // A line of 100 mm with ten times as many points in its first half, and a density of contacts largest at 30 mm.
+        let mut points: Vec<[f32; 3]> = (0..100).map(|i| [i as f32 * 0.0005, 0.0, 0.0]).collect();
+        points.extend((0..10).map(|i| [0.05 + i as f32 * 0.005, 0.0, 0.0]));
+        let density = |x: f32| (-(x - 0.03) * (x - 0.03) / (2.0 * 0.015 * 0.015)).exp();
+        let spacing = |i: usize| if i < 100 { 0.0005 } else { 0.005 };
+        let mut channel: Vec<f32> = points.iter().enumerate().map(|(i, p)| density(p[0]) * spacing(i)).collect();
+        let total: f32 = channel.iter().sum();
+        channel.iter_mut().for_each(|p| *p /= total);
+        assert!(points[largest(&channel)][0] > 0.045, "the most probable single point stands for more surface");
+        let map = ContactMap { fingers: [channel.clone(), channel] };
+        for peak in map.peaks(&points, 0.012) {
+            assert!((points[peak][0] - 0.03).abs() < 0.002, "{}", points[peak][0]);
+        }
+        // Within a radius smaller than all distances each point stands for itself.
+        assert_eq!(map.peaks(&points, 1e-5), [largest(&map.fingers[0]); 2]);
+    }
+
+    #[test]
+    fn masses_are_hat_weighted_sums() {
+        let points = [[0.0, 0.0, 0.0], [0.005, 0.0, 0.0], [0.02, 0.0, 0.0]];
+        let map = ContactMap { fingers: [vec![0.5, 0.3, 0.2], vec![0.0, 0.05, 0.95]] };
+        let [first, second] = map.masses(&points, 0.01);
+        let expected = [0.5 + 0.75 * 0.3, 0.3 + 0.75 * 0.5, 0.2];
+        assert!(first.iter().zip(expected).all(|(m, e)| (m - e).abs() < 1e-6), "{first:?}");
+        assert_eq!((second[0], second[1]), (0.0, 0.0));
+        assert_eq!(map.peaks(&points, 0.01), [0, 2]);
     }
 }

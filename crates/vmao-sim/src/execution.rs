@@ -6,7 +6,7 @@ use crate::simulation::{Grip, Simulation};
 use nalgebra::{Vector3, Vector6};
 use serde::{Deserialize, Serialize};
 use vmao_core::contact::{ArmId, PartId};
-use vmao_core::geometry::{Pose, rotation_distance, rotation_log};
+use vmao_core::geometry::{Pose, interpolate, rotation_distance, rotation_log};
 use vmao_core::object_centric::{ObjectTrajectory, gripper_goal};
 use vmao_core::osc::JointVector;
 use vmao_core::outcome::FailureStage;
@@ -32,6 +32,8 @@ pub struct MotionConfig {
     pub collision_force: f64,
     /// Waypoints at which a motion of the object is planned.
     pub waypoints: usize,
+    /// Time constant (s) with which a hand accepts its part's place in it as the one to keep; zero: at once.
+    pub grip_memory: f64,
     /// Simulated steps that a trial may take.
     pub max_steps: u64,
 }
@@ -151,8 +153,9 @@ impl Simulation<'_> {
 
     /// Carries the object along `trajectory` with the arms that hold it; `postures` are their planned joint positions.
     ///
-    /// At each tick, Eq. (1)-(2) are evaluated from where the parts really are: a gripper's target is its present pose
-    /// moved by what its part still lacks. Runs for the trajectory's duration and `extra` seconds at its end.
+    /// At each tick a gripper's target is its part's wanted pose (Eq. 2) times the grip, the tool's pose on the part, so that
+    /// the hand keeps its part still in it. The grip follows what is really there with `motion.grip_memory`: a part that
+    /// has slipped still comes to its goal. Runs for the trajectory's duration and `extra` seconds at its end.
     pub(crate) fn carry(
         &mut self,
         trajectory: &ObjectTrajectory,
@@ -166,15 +169,19 @@ impl Simulation<'_> {
         let mut wanted = trajectory.part_poses_at(0.0);
         let mut lost = vec![0; held.len()];
         let part_from_tools = self.part_from_tools(held);
+        let mut grips = part_from_tools.clone();
+        let accepted = (self.scene.timestep / motion.grip_memory.max(self.scene.timestep)).min(1.0);
         for tick in 1..=ticks {
             let time = tick as f64 * self.scene.timestep;
             let next = trajectory.part_poses_at(time);
-            let parts = self.object_state().world_from_parts;
-            for (&(arm, part), postures) in held.iter().zip(postures) {
+            for (((&(arm, part), postures), grip), now) in
+                held.iter().zip(postures).zip(&mut grips).zip(self.part_from_tools(held))
+            {
                 let (arm, part) = (usize::from(arm.0), usize::from(part.0));
                 let tool = self.tool_pose(arm);
+                *grip = interpolate(grip, &now, accepted);
                 let goal = &mut self.goals[arm];
-                goal.world_from_tool = gripper_goal(&parts[part], &next[part], &tool);
+                goal.world_from_tool = next[part] * *grip;
                 goal.twist = twist_at(&wanted[part], &next[part], &tool, self.scene.timestep);
                 goal.posture = posture_at(postures, time / trajectory.duration());
             }

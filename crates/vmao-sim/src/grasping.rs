@@ -106,6 +106,8 @@ pub(crate) fn reachable_grasps(
 ) -> Result<Vec<Grasp>, Failure> {
     let index = usize::from(arm.0);
     let robot = &simulation.scene.robots[index];
+    let squared = squared(fingers, cloud, config.squaring_deg.to_radians());
+    let fingers = squared.as_ref().unwrap_or(fingers);
     let width = (fingers[0] - fingers[1]).norm();
     let Some(opening) = opening_for(robot, config, width) else {
         let limit = robot.gripper.max_opening();
@@ -114,8 +116,7 @@ pub(crate) fn reachable_grasps(
             format!("contacts {width:.3} m apart; the gripper opens {limit:.3} m"),
         ));
     };
-    let squared = squared(fingers, cloud, config.squaring_deg.to_radians());
-    let poses = gripper_poses(squared.as_ref().unwrap_or(fingers), config.approaches);
+    let poses = gripper_poses(fingers, config.approaches);
     if poses.is_empty() {
         return Err(Failure::new(FailureStage::Unreachable, "both fingers on one point"));
     }

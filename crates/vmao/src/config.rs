@@ -153,7 +153,7 @@ pub enum NearDuplicates {
 }
 
 /// The cells of the table.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct EvaluateConfig {
     /// Trials of each cell.
@@ -168,6 +168,8 @@ pub struct EvaluateConfig {
     pub best_of: usize,
     /// How finger points are taken from contact maps.
     pub draw: Draw,
+    /// Within which the probability about a peak is counted (m).
+    pub peak_radius: f64,
 }
 
 impl Config {
@@ -326,6 +328,7 @@ impl Config {
         at_least_one("evaluate.trials", evaluate.trials)?;
         ensure(!evaluate.orders.is_empty(), "evaluate.orders", "no orders", "at least one")?;
         ensure(!evaluate.methods.is_empty(), "evaluate.methods", "no methods", "at least one")?;
+        within("evaluate.peak_radius", evaluate.peak_radius, 1e-6, 1.0)?;
         ensure((1..=1000).contains(&evaluate.best_of), "evaluate.best_of", &evaluate.best_of.to_string(), "1 to 1000")?;
         self.network.validate().map_err(|error| format!("network: {error}"))?;
         self.train.validate().map_err(|error| format!("train: {error}"))?;
@@ -387,6 +390,7 @@ fn check_control(grasp: &GraspConfig, motion: &MotionConfig, osc: &OscGains) -> 
     positive("motion.collision_force", motion.collision_force)?;
     within("motion.waypoints", motion.waypoints as f64, 1.0, 1000.0)?;
     at_least_one("motion.max_steps", motion.max_steps)?;
+    within("motion.grip_memory", motion.grip_memory, 0.0, 1e6)?;
     positive("osc.position_stiffness", osc.position_stiffness)?;
     positive("osc.rotation_stiffness", osc.rotation_stiffness)?;
     positive("osc.damping_ratio", osc.damping_ratio)?;

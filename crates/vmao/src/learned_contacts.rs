@@ -4,7 +4,7 @@ use crate::config::EvaluateConfig;
 use crate::results::Method;
 use nalgebra::Point3;
 use serde::{Deserialize, Serialize};
-use vmao_core::contact::ContactMap;
+use vmao_core::contact::{ContactMap, largest};
 use vmao_core::contact_model::{ContactModel, ContactQuery, FingerPoints};
 use vmao_core::random::Stream;
 use vmao_net::{ContactNetwork, ModelKind};
@@ -13,7 +13,7 @@ use vmao_net::{ContactNetwork, ModelKind};
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Draw {
-    /// The most probable point of each finger.
+    /// The point of each finger about which most of its probability lies.
     Peak,
     /// A point of each finger drawn with its probability.
     Sample,
@@ -29,6 +29,8 @@ pub struct LearnedContacts {
     pub samples: usize,
     /// How points are taken from the maps.
     pub draw: Draw,
+    /// Within which a peak's probability is counted (m): [`ContactMap::masses`].
+    pub peak_radius: f64,
 }
 
 /// The configured methods whose networks are among `models`.
@@ -36,7 +38,10 @@ pub fn methods(config: &EvaluateConfig, models: &[(ModelKind, Vec<ContactNetwork
     let with_model = |&method: &Method| {
         let (_, networks) = models.iter().find(|(kind, _)| *kind == method.model())?;
         let samples = if method == Method::BestOfK { config.best_of } else { 1 };
-        Some((method, LearnedContacts { networks: networks.clone(), samples, draw: config.draw }))
+        Some((
+            method,
+            LearnedContacts { networks: networks.clone(), samples, draw: config.draw, peak_radius: config.peak_radius },
+        ))
     };
     config.methods.iter().filter_map(with_model).collect()
 }
@@ -51,7 +56,7 @@ pub fn drawn_points(map: &ContactMap, stream: &mut Stream) -> [usize; 2] {
     [0, 1].map(|finger| stream.weighted(&map.fingers[finger].iter().map(|&p| f64::from(p)).collect::<Vec<f64>>()))
 }
 
-/// The different pairs among these, those of the largest product of probabilities first.
+/// The different pairs among these, those of the largest weights first.
 fn ranked(pairs: impl Iterator<Item = (f32, [usize; 2])>) -> Vec<[usize; 2]> {
     let mut ranked: Vec<(f32, [usize; 2])> = Vec::new();
     for (probability, pair) in pairs {
@@ -63,14 +68,16 @@ fn ranked(pairs: impl Iterator<Item = (f32, [usize; 2])>) -> Vec<[usize; 2]> {
     ranked.into_iter().map(|(_, pair)| pair).collect()
 }
 
-/// A pair with the product of its probabilities in the map that it is from.
-fn weighed(map: &ContactMap, pair: [usize; 2]) -> (f32, [usize; 2]) {
-    (map.fingers[0][pair[0]] * map.fingers[1][pair[1]], pair)
+/// A map's peaks with the product of the probabilities about them.
+fn weighed_peaks(map: &ContactMap, points: &[[f32; 3]], radius: f32) -> (f32, [usize; 2]) {
+    let masses = map.masses(points, radius);
+    let peaks = masses.each_ref().map(|masses| largest(masses));
+    (masses[0][peaks[0]] * masses[1][peaks[1]], peaks)
 }
 
-/// The different peaks of these maps, the most probable first.
-pub fn ranked_peaks(maps: &[ContactMap]) -> Vec<[usize; 2]> {
-    ranked(maps.iter().map(|map| weighed(map, map.peaks())))
+/// The different peaks of these maps on the cloud `points` (m), those with most probability about them first.
+pub fn ranked_peaks(maps: &[ContactMap], points: &[[f32; 3]], radius: f32) -> Vec<[usize; 2]> {
+    ranked(maps.iter().map(|map| weighed_peaks(map, points, radius)))
 }
 
 impl ContactModel for LearnedContacts {
@@ -84,11 +91,13 @@ impl ContactModel for LearnedContacts {
         let mut pairs = Vec::with_capacity(self.samples);
         for _ in 0..self.samples {
             let Ok(map) = network.decode(&scene, &latent(network, stream)) else { continue };
-            let pair = match self.draw {
-                Draw::Peak => map.peaks(),
-                Draw::Sample => drawn_points(&map, stream),
-            };
-            pairs.push(weighed(&map, pair));
+            pairs.push(match self.draw {
+                Draw::Peak => weighed_peaks(&map, &seen.points, self.peak_radius as f32),
+                Draw::Sample => {
+                    let pair = drawn_points(&map, stream);
+                    (map.fingers[0][pair[0]] * map.fingers[1][pair[1]], pair)
+                }
+            });
         }
         let place = |index: usize| Point3::from(seen.points[index].map(f64::from));
         ranked(pairs.into_iter()).into_iter().map(|pair| pair.map(place)).collect()
@@ -118,6 +127,7 @@ mod tests {
             let channel: Vec<f32> = (0..3).map(|i| if i == peak { p } else { (1.0 - p) / 2.0 }).collect();
             ContactMap { fingers: [channel.clone(), channel] }
         };
-        assert_eq!(ranked_peaks(&[map(0.5, 0), map(0.9, 2), map(0.6, 0), map(0.7, 1)]), [[2, 2], [1, 1], [0, 0]]);
+        let points = [[0.0; 3], [1.0, 0.0, 0.0], [2.0, 0.0, 0.0]];
+        assert_eq!(ranked_peaks(&[map(0.5, 0), map(0.9, 2), map(0.6, 0), map(0.7, 1)], &points, 0.01), [[2, 2], [1, 1], [0, 0]]);
     }
 }

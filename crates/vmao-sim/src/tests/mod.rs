@@ -4,6 +4,7 @@ mod cameras;
 mod catalogue;
 mod control;
 mod dependency_root;
+mod grips;
 mod hulls;
 mod imported;
 mod internal_forces;

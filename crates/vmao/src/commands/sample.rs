@@ -50,7 +50,12 @@ pub(super) fn run(arguments: &SampleArguments, session: &Session) -> Result<(), 
         ModelKind::Vmao => Method::Vmao,
         ModelKind::Top1 => Method::Top1,
     };
-    let model = LearnedContacts { networks, samples: 1, draw: session.config.evaluate.draw };
+    let model = LearnedContacts {
+        networks,
+        samples: 1,
+        draw: session.config.evaluate.draw,
+        peak_radius: session.config.evaluate.peak_radius,
+    };
     let grasp = arguments.grasp as usize - 1;
     if grasp >= model.networks.len() {
         let found = arguments.grasp;

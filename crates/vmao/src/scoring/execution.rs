@@ -1,7 +1,7 @@
 //! Samples carried out: the same start and goal again and again, each time with the next sample of every grasp.
 
 use super::measure::{Models, code, draw_stream};
-use super::samplers::{Apart, Sampler, pairs};
+use super::samplers::{Peaks, Sampler, pairs};
 use crate::output::progress_bar;
 use crate::reference::{Grounds, Place};
 use nalgebra::Point3;
@@ -40,7 +40,7 @@ struct Numbered<'a> {
     number: usize,
     place: Place,
     seed: u64,
-    apart: Apart,
+    rules: Peaks,
     codes: usize,
 }
 
@@ -66,7 +66,7 @@ impl Numbered<'_> {
         let first = codes.start;
         let maps = codes.map(map).collect::<Option<Vec<_>>>()?;
         let streams = |k: usize| draw_stream(self.seed, self.sampler, self.place, part, [0, first + k]);
-        let found = pairs(self.sampler, &maps, &seen.points, self.apart, count, &streams);
+        let found = pairs(self.sampler, &maps, &seen.points, self.rules, count, &streams);
         // Where there are fewer samples than asked for, they begin again.
         let pair = found.get(at).or_else(|| found.get(at % found.len().max(1)))?;
         Some(pair.map(|point| Point3::from(seen.points[point].map(f64::from))))
@@ -85,8 +85,8 @@ pub fn execute(grounds: &Grounds<'_>, places: &[Place], models: &Models, count: 
     let bar = progress_bar("execute", jobs.len() as u64);
     let run = |&(place, sampler, number): &(Place, Sampler, usize)| {
         let widest = grounds.scene(place).robots.iter().map(|robot| robot.gripper.max_opening()).fold(0.0, f64::max);
-        let apart = Apart { distance: config.distance, widest };
-        let model = Numbered { models, sampler, number, place, seed: grounds.seed(), apart, codes: config.codes };
+        let rules = Peaks { radius: grounds.config().evaluate.peak_radius, distance: config.distance, widest };
+        let model = Numbered { models, sampler, number, place, seed: grounds.seed(), rules, codes: config.codes };
         let record = grounds.trial(place, &model).record;
         bar.inc(1);
         let mut grasps = record.grasps;

@@ -3,7 +3,7 @@
 use super::calibration::Rank;
 use super::grips::{Comparison, compare, left_out, mean, modes};
 use super::likelihood::{code_information, divergence, log_mean_exp, log_weight};
-use super::samplers::{Apart, Sampler, pairs};
+use super::samplers::{Peaks, Sampler, pairs};
 use crate::failure::Failure;
 use crate::learned_contacts::latent;
 use crate::output::progress_bar;
@@ -248,12 +248,12 @@ fn score_scene(
         posterior_means.extend(bound.map(|bound| bound.mean));
     }
     let gripper = grounds.scene(place).robots.iter().map(|robot| robot.gripper.max_opening()).fold(0.0, f64::max);
-    let apart = Apart { distance: config.distance, widest: gripper };
+    let rules = Peaks { radius: grounds.config().evaluate.peak_radius, distance: config.distance, widest: gripper };
     let shown = contexts.len().min(config.contexts);
     let mut compared: Vec<BTreeMap<Sampler, Vec<Comparison>>> = Vec::new();
     let (mut samples, mut information) = (BTreeMap::new(), Vec::new());
     for (number, context) in contexts[..shown].iter().enumerate() {
-        let drawn = sample(context, (grounds.seed(), place, part, number), apart, codes);
+        let drawn = sample(context, (grounds.seed(), place, part, number), rules, codes);
         compared.push(
             drawn.iter().map(|(&sampler, all)| (sampler, comparisons(sampler, all, &references, &mode_of, config))).collect(),
         );
@@ -322,7 +322,7 @@ fn in_part(world_from_part: &Pose, point: [f32; 3]) -> Point3<f64> {
 fn sample(
     context: &Context<'_>,
     (seed, place, part, number): (u64, Place, usize, usize),
-    apart: Apart,
+    rules: Peaks,
     count: usize,
 ) -> BTreeMap<Sampler, Vec<FingerPoints>> {
     let points = &context.grasp.observation.points;
@@ -333,7 +333,7 @@ fn sample(
             continue;
         }
         let streams = |k: usize| draw_stream(seed, sampler, place, part, [number, k]);
-        let found = pairs(sampler, &maps, points, apart, count, &streams);
+        let found = pairs(sampler, &maps, points, rules, count, &streams);
         let place_of = |pair: [usize; 2]| pair.map(|point| in_part(&context.grasp.world_from_part, points[point]));
         drawn.insert(sampler, found.into_iter().map(place_of).collect());
     }

@@ -58,10 +58,12 @@ impl Sampler {
     }
 }
 
-/// What Top-1's peaks must keep.
+/// What a map's peaks are, and what Top-1's must keep.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Apart {
-    /// Pairs are at least this far apart: the farther of their fingers' distances (m).
+pub struct Peaks {
+    /// Within which a peak's probability is counted (m): [`ContactMap::masses`].
+    pub radius: f64,
+    /// Top-1's pairs are at least this far apart: the farther of their fingers' distances (m).
     pub distance: f64,
     /// The widest that a gripper opens (m).
     pub widest: f64,
@@ -74,17 +76,20 @@ pub fn pairs(
     sampler: Sampler,
     maps: &[ContactMap],
     points: &[[f32; 3]],
-    apart: Apart,
+    rules: Peaks,
     count: usize,
     streams: &dyn Fn(usize) -> Stream,
 ) -> Vec<[usize; 2]> {
+    let radius = rules.radius as f32;
     match sampler {
-        Sampler::VmaoPeak => maps.iter().take(count).map(ContactMap::peaks).collect(),
+        Sampler::VmaoPeak => maps.iter().take(count).map(|map| map.peaks(points, radius)).collect(),
         Sampler::VmaoDraw => {
             maps.iter().take(count).enumerate().map(|(code, map)| drawn_points(map, &mut streams(code))).collect()
         }
-        Sampler::VmaoRanked => ranked_peaks(maps).into_iter().take(count).collect(),
-        Sampler::Top1Peaks => maps.first().map_or_else(Vec::new, |map| separated_peaks(map, points, apart, count)),
+        Sampler::VmaoRanked => ranked_peaks(maps, points, radius).into_iter().take(count).collect(),
+        Sampler::Top1Peaks => {
+            maps.first().map_or_else(Vec::new, |map| separated_peaks(&map.masses(points, radius), points, rules, count))
+        }
         Sampler::Top1Draw => {
             let draw = |map: &ContactMap| (0..count).map(|k| drawn_points(map, &mut streams(k))).collect();
             maps.first().map_or_else(Vec::new, draw)
@@ -102,8 +107,8 @@ pub fn pairs(
 /// Points of each finger that are combined; the product of two less probable ones is never among the best that are looked at.
 const COMBINED: usize = 256;
 
-/// The most probable pairs by the product of their probabilities, each apart from all before, none wider than a gripper opens.
-fn separated_peaks(map: &ContactMap, points: &[[f32; 3]], apart: Apart, count: usize) -> Vec<[usize; 2]> {
+/// The pairs of the largest products of `masses`, each apart from all before, none wider than a gripper opens.
+fn separated_peaks(masses: &[Vec<f32>; 2], points: &[[f32; 3]], rules: Peaks, count: usize) -> Vec<[usize; 2]> {
     let best = |channel: &[f32]| {
         let mut order: Vec<usize> = (0..channel.len()).collect();
         order.sort_by(|&a, &b| channel[b].total_cmp(&channel[a]));
@@ -115,10 +120,10 @@ fn separated_peaks(map: &ContactMap, points: &[[f32; 3]], apart: Apart, count: u
         squared.sqrt()
     };
     let mut all: Vec<(f32, [usize; 2])> = Vec::new();
-    let second = best(&map.fingers[1]);
-    for a in best(&map.fingers[0]) {
-        let spanned = second.iter().filter(|&&b| distance(a, b) <= apart.widest);
-        all.extend(spanned.map(|&b| (map.fingers[0][a] * map.fingers[1][b], [a, b])));
+    let second = best(&masses[1]);
+    for a in best(&masses[0]) {
+        let spanned = second.iter().filter(|&&b| distance(a, b) <= rules.widest);
+        all.extend(spanned.map(|&b| (masses[0][a] * masses[1][b], [a, b])));
     }
     all.sort_by(|a, b| b.0.total_cmp(&a.0));
     let mut chosen: Vec<[usize; 2]> = Vec::new();
@@ -126,7 +131,7 @@ fn separated_peaks(map: &ContactMap, points: &[[f32; 3]], apart: Apart, count: u
         if chosen.len() == count {
             break;
         }
-        let near = |other: &[usize; 2]| (0..2).all(|f| distance(pair[f], other[f]) < apart.distance);
+        let near = |other: &[usize; 2]| (0..2).all(|f| distance(pair[f], other[f]) < rules.distance);
         if !chosen.iter().any(near) {
             chosen.push(pair);
         }
@@ -152,11 +157,11 @@ mod tests {
     #[test]
     fn separated_peaks_are_ranked_apart_and_within_the_gripper() {
         let (points, map) = line([0.4, 0.3, 0.2, 0.1], [0.05, 0.35, 0.1, 0.5]);
-        let apart = Apart { distance: 0.015, widest: 0.025 };
+        let rules = Peaks { radius: 1e-6, distance: 0.015, widest: 0.025 };
         // 0-3 is too wide; 1-3 (0.15) is best; 0-1 (0.14) is 2 cm from it at finger 2; 1-1 and 2-3 are near one of them.
-        let found = pairs(Sampler::Top1Peaks, from_ref(&map), &points, apart, 3, &stream);
+        let found = pairs(Sampler::Top1Peaks, from_ref(&map), &points, rules, 3, &stream);
         assert_eq!(found, [[1, 3], [0, 1], [2, 1]]);
-        let wide = Apart { distance: 1.0, widest: 1.0 };
+        let wide = Peaks { radius: 1e-6, distance: 1.0, widest: 1.0 };
         assert_eq!(
             pairs(Sampler::Top1Peaks, from_ref(&map), &points, wide, 3, &stream),
             [[0, 3]],
@@ -167,13 +172,13 @@ mod tests {
     #[test]
     fn draws_follow_the_map_and_depend_on_their_number_only() {
         let (points, map) = line([0.0, 0.5, 0.5, 0.0], [1.0, 0.0, 0.0, 0.0]);
-        let apart = Apart { distance: 0.01, widest: 1.0 };
-        let draw = |count| pairs(Sampler::Top1Draw, from_ref(&map), &points, apart, count, &stream);
+        let rules = Peaks { radius: 1e-6, distance: 0.01, widest: 1.0 };
+        let draw = |count| pairs(Sampler::Top1Draw, from_ref(&map), &points, rules, count, &stream);
         let all = draw(400);
         assert_eq!(draw(7), all[..7]);
         let ones = all.iter().filter(|pair| pair[0] == 1).count();
         assert!(all.iter().all(|pair| pair[1] == 0 && (1..=2).contains(&pair[0])) && (150..250).contains(&ones), "{ones}");
-        let any = pairs(Sampler::Uniform, &[], &points, apart, 400, &stream);
+        let any = pairs(Sampler::Uniform, &[], &points, rules, 400, &stream);
         assert!((0..4).all(|point| any.iter().filter(|pair| pair[0] == point).count() > 60));
     }
 
@@ -181,10 +186,10 @@ mod tests {
     fn codes_give_their_own_peaks_and_ranking_sorts_them() {
         let (points, low) = line([0.4, 0.3, 0.2, 0.1], [0.1, 0.2, 0.3, 0.4]);
         let (_, high) = line([0.0, 0.9, 0.1, 0.0], [0.0, 0.0, 0.1, 0.9]);
-        let apart = Apart { distance: 0.01, widest: 1.0 };
+        let rules = Peaks { radius: 1e-6, distance: 0.01, widest: 1.0 };
         let maps = [low.clone(), high.clone(), low];
-        assert_eq!(pairs(Sampler::VmaoPeak, &maps, &points, apart, 9, &stream), [[0, 3], [1, 3], [0, 3]]);
-        assert_eq!(pairs(Sampler::VmaoRanked, &maps, &points, apart, 9, &stream), [[1, 3], [0, 3]]);
-        assert_eq!(pairs(Sampler::VmaoDraw, &maps, &points, apart, 2, &stream).len(), 2);
+        assert_eq!(pairs(Sampler::VmaoPeak, &maps, &points, rules, 9, &stream), [[0, 3], [1, 3], [0, 3]]);
+        assert_eq!(pairs(Sampler::VmaoRanked, &maps, &points, rules, 9, &stream), [[1, 3], [0, 3]]);
+        assert_eq!(pairs(Sampler::VmaoDraw, &maps, &points, rules, 2, &stream).len(), 2);
     }
 }
