@@ -5,6 +5,7 @@
 pub mod acceptance;
 pub mod commands;
 pub mod config;
+mod config_bounds;
 mod config_layers;
 mod contact_maps;
 pub mod dataset;

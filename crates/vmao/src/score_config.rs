@@ -1,5 +1,6 @@
 //! How well a learned distribution is measured: the configuration's `[score]`.
 
+use crate::config_bounds::within;
 use serde::{Deserialize, Serialize};
 
 /// What `vmao reference` tries and `vmao score` compares.
@@ -31,28 +32,23 @@ pub struct ScoreConfig {
 impl ScoreConfig {
     /// Refuses what cannot be measured with.
     pub fn check(&self) -> Result<(), String> {
-        let lengths = [("distance", self.distance), ("mode_distance", self.mode_distance)];
+        let lengths = [("score.distance", self.distance), ("score.mode_distance", self.mode_distance)];
         for (key, value) in lengths {
             within(key, value, 1e-4, 1.0)?;
         }
-        within("mode_angle_deg", self.mode_angle_deg, 0.1, 90.0)?;
-        within("scenes", self.scenes as f64, 1.0, 999.0)?;
-        within("tries", self.tries as f64, 1.0, 1e5)?;
-        within("samples", self.samples.len() as f64, 1.0, 16.0)?;
+        within("score.mode_angle_deg", self.mode_angle_deg, 0.1, 90.0)?;
+        within("score.scenes", self.scenes as f64, 1.0, 999.0)?;
+        within("score.tries", self.tries as f64, 1.0, 1e5)?;
+        within("score.samples", self.samples.len() as f64, 1.0, 16.0)?;
         for &count in &self.samples {
-            within("samples", count as f64, 1.0, 4096.0)?;
+            within("score.samples", count as f64, 1.0, 4096.0)?;
         }
         let counts = [
-            ("codes", self.codes),
-            ("likelihoods", self.likelihoods),
-            ("contexts", self.contexts),
-            ("resamples", self.resamples),
+            ("score.codes", self.codes),
+            ("score.likelihoods", self.likelihoods),
+            ("score.contexts", self.contexts),
+            ("score.resamples", self.resamples),
         ];
         counts.into_iter().try_for_each(|(key, value)| within(key, value as f64, 1.0, 1e5))
     }
-}
-
-fn within(key: &str, value: f64, lowest: f64, highest: f64) -> Result<(), String> {
-    let holds = value >= lowest && value <= highest;
-    if holds { Ok(()) } else { Err(format!("score.{key}: {value}, expected {lowest} to {highest}")) }
 }
