@@ -54,29 +54,20 @@ pub fn gripper_poses(fingers: &[Point3<f64>; 2], count: usize) -> Vec<GripperPos
     poses
 }
 
-/// The same contacts with the closing axis turned square to the bar they lie on, and level where it is nearly so.
+/// The same contacts with the closing axis turned square to the bar they lie on and flat on its sides, about the bar's middle.
 ///
-/// The bar's direction is the principal axis of the cloud `points` around the contacts' middle. Pads that close askew
-/// turn the part or the hand until they lie flat; planning for the square grasp foresees it. `None` where the points
-/// nearby are not drawn out like a bar, or the axis would have to turn by more than `limit` (rad).
+/// The bar's direction is the principal axis of the cloud `points` around the contacts' middle; flat is where the bar is
+/// narrowest between two pads, and level if all ways are alike. Pads that close askew turn the part or the hand until
+/// they lie flat; planning for the square grasp foresees it. `None` where the points nearby are not drawn out like a bar,
+/// or the axis would have to turn by more than `limit` (rad).
 pub fn squared(fingers: &[Point3<f64>; 2], points: &[Point3<f64>], limit: f64) -> Option<[Point3<f64>; 2]> {
     let middle = nalgebra::center(&fingers[0], &fingers[1]);
     let near: Vec<Vector3<f64>> =
         points.iter().map(|point| point - middle).filter(|offset| offset.norm() < BAR_NEIGHBOURHOOD).collect();
-    if near.len() < FEWEST_BAR_POINTS {
-        return None;
-    }
-    let mean: Vector3<f64> = near.iter().sum::<Vector3<f64>>() / near.len() as f64;
-    let covariance: Matrix3<f64> = near.iter().map(|offset| (offset - mean) * (offset - mean).transpose()).sum();
-    let eigen = covariance.symmetric_eigen();
-    let longest = eigen.eigenvalues.imax();
-    let second = (0..3).filter(|&i| i != longest).map(|i| eigen.eigenvalues[i]).fold(0.0, f64::max);
-    if eigen.eigenvalues[longest] < BAR_ELONGATION * second {
-        return None;
-    }
-    let bar = eigen.eigenvectors.column(longest).into_owned();
+    let bar = direction_of_bar(&near)?;
     let along = fingers[0] - fingers[1];
     let mut square = along - bar * bar.dot(&along);
+    let reach = square.norm() / 2.0 + SLICE_MARGIN;
     let tilt = square.z.abs().atan2(square.xy().norm());
     // Level first, then square again within the level plane, unless the bar itself stands upright.
     if tilt < limit {
@@ -85,13 +76,43 @@ pub fn squared(fingers: &[Point3<f64>; 2], points: &[Point3<f64>], limit: f64) -
             square = across * across.dot(&along);
         }
     }
-    let direction = square.try_normalize(1e-6)?;
+    let square = square.try_normalize(1e-6)?;
+    let slice = |offset: &&Vector3<f64>| offset.dot(&bar).abs() < SLICE && (*offset - bar * offset.dot(&bar)).norm() < reach;
+    let slice: Vec<Vector3<f64>> = near.iter().filter(slice).copied().collect();
+    let (direction, [low, high]) = narrowest(&slice, &Unit::new_unchecked(bar), square)?;
     if direction.dot(&along) < along.norm() * limit.cos() {
         return None;
     }
-    // Only the distance across the bar says how far to open; what the points differ along it does not.
-    let half = direction * (along.dot(&direction) / 2.0);
-    Some([middle + half, middle - half])
+    let at = |place: f64| middle + direction * place;
+    Some([at(high), at(low)])
+}
+
+/// The principal axis of these offsets (m); none if they are few or not drawn out.
+fn direction_of_bar(near: &[Vector3<f64>]) -> Option<Vector3<f64>> {
+    if near.len() < FEWEST_BAR_POINTS {
+        return None;
+    }
+    let mean: Vector3<f64> = near.iter().sum::<Vector3<f64>>() / near.len() as f64;
+    let covariance: Matrix3<f64> = near.iter().map(|offset| (offset - mean) * (offset - mean).transpose()).sum();
+    let eigen = covariance.symmetric_eigen();
+    let longest = eigen.eigenvalues.imax();
+    let second = (0..3).filter(|&i| i != longest).map(|i| eigen.eigenvalues[i]).fold(0.0, f64::max);
+    let drawn_out = eigen.eigenvalues[longest] >= BAR_ELONGATION * second;
+    drawn_out.then(|| eigen.eigenvectors.column(longest).into_owned())
+}
+
+/// The direction about `bar` near `start` in which these offsets (m) reach least far, and from where to where they reach in it.
+fn narrowest(slice: &[Vector3<f64>], bar: &Unit<Vector3<f64>>, start: Vector3<f64>) -> Option<(Vector3<f64>, [f64; 2])> {
+    let most = (MOST_TURN / TURN_STEP).round() as i32;
+    let turned = (-most..=most).map(|step| {
+        let angle = f64::from(step) * TURN_STEP;
+        let direction = Rotation3::from_axis_angle(bar, angle) * start;
+        let places = slice.iter().map(|offset| offset.dot(&direction));
+        let [low, high] = places.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], x| [low.min(x), high.max(x)]);
+        (high - low + TURN_COST * angle.abs(), direction, [low, high])
+    });
+    let least = turned.min_by(|a, b| a.0.total_cmp(&b.0))?;
+    (slice.len() >= FEWEST_BAR_POINTS).then_some((least.1, least.2))
 }
 
 /// Cloud points within this distance of the contacts' middle show the bar's direction (m) ...
@@ -100,6 +121,13 @@ const BAR_NEIGHBOURHOOD: f64 = 0.035;
 const FEWEST_BAR_POINTS: usize = 12;
 /// ... and their longest variance is this many times the next.
 const BAR_ELONGATION: f64 = 1.6;
+/// Points this far along the bar (m), and so much farther across it than the contacts (m), show its cross-section.
+const SLICE: f64 = 0.014;
+const SLICE_MARGIN: f64 = 0.006;
+/// Directions about the bar that are compared (rad), and what turning costs (m/rad): more than noise, less than an edge.
+const MOST_TURN: f64 = 0.75;
+const TURN_STEP: f64 = 0.03;
+const TURN_COST: f64 = 0.001;
 
 #[cfg(test)]
 mod tests {
@@ -158,6 +186,15 @@ mod tests {
         assert!((axis - Vector3::y()).norm() < 0.02, "{axis:?}");
         let middle = nalgebra::center(&square[0], &square[1]);
         assert!((middle - nalgebra::center(&askew[0], &askew[1])).norm() < 1e-12);
+        // Carried and tilted by 0.3 rad about itself, with one finger's point on top: flat on its sides, about its middle.
+        let roll = turn * Rotation3::from_axis_angle(&Vector3::x_axis(), 0.3) * turn.inverse();
+        let tilted: Vec<Point3<f64>> = bar.iter().map(|point| roll * point).collect();
+        let one_on_top =
+            [turn * Point3::new(0.0, 0.004, 0.018), turn * Point3::new(0.0, -0.008, 0.006)].map(|point| roll * point);
+        let square = squared(&one_on_top, &tilted, 1.4).unwrap();
+        let [first, second] = square.map(|point| turn.inverse() * (roll.inverse() * point));
+        assert!((first.y - 0.008).abs() < 1e-3 && (second.y + 0.008).abs() < 1e-3, "{first} {second}");
+        assert!((first.z - second.z).abs() < 0.6e-3, "{first} {second}");
         let mut stream = crate::random::Stream::new(1, &[]);
         let ball: Vec<Point3<f64>> = (0..400)
             .filter_map(|_| Vector3::new(stream.normal(), stream.normal(), stream.normal()).try_normalize(1e-6))
