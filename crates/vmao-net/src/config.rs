@@ -91,6 +91,9 @@ pub struct NetworkConfig {
     pub latent_placement: LatentPlacement,
     /// Weight of the KL divergence against the reconstruction (nats per nat).
     pub beta: f32,
+    /// λ: what each number of the latent code may say without being charged for, on the mean over a batch (nats); 0 charges for all.
+    #[serde(default)]
+    pub free_bits: f32,
     /// Fraction of the epochs in which the weight of the KL divergence rises linearly from zero.
     pub warm_up: f32,
     /// Spread of a contact label over the cloud: standard deviation of a Gaussian about the contact point (m).
@@ -153,7 +156,7 @@ impl NetworkConfig {
             refine: refine.to_vec(),
         };
         Self {
-            points: 1024,
+            points: 2048,
             density_power: 1.0,
             abstraction: vec![
                 down(192, 0.015, 16, &[16, 32]),
@@ -166,6 +169,7 @@ impl NetworkConfig {
             latent_size: 3,
             latent_placement: LatentPlacement::EveryLevel,
             beta: 0.03,
+            free_bits: 0.5,
             warm_up: 0.1,
             label_sigma: 0.006,
             table_height: 0.003,
@@ -216,6 +220,7 @@ impl NetworkConfig {
         check("head", self.head, (1..=4096).contains(&self.head), "1 to 4096")?;
         check("latent_size", self.latent_size, (1..=1024).contains(&self.latent_size), "1 to 1024")?;
         check("beta", self.beta, self.beta >= 0.0 && self.beta.is_finite(), "zero or positive")?;
+        check("free_bits", self.free_bits, (0.0..=100.0).contains(&self.free_bits), "0 to 100 (nats)")?;
         check("warm_up", self.warm_up, (0.0..=1.0).contains(&self.warm_up), "a fraction of the epochs, 0 to 1")?;
         for (field, value) in [("label_sigma", self.label_sigma), ("position_unit", self.position_unit)] {
             check(field, value, value > 0.0 && value.is_finite(), "a positive length (m)")?;

@@ -36,6 +36,7 @@ pub(crate) struct Cvae {
     pub(crate) logits: ModulatedHead,
     pub(crate) placement: LatentPlacement,
     latent_size: usize,
+    free_bits: f32,
 }
 
 /// q(z | scene, maps): an encoder of its own and the two linear maps to mean and log variance.
@@ -52,7 +53,16 @@ pub(crate) struct Terms<O: Operations> {
     /// Cross entropy, mean over clouds and fingers.
     pub(crate) reconstruction: Tensor<O::Tape, 1>,
     /// KL divergence, mean over clouds; none without latent code.
-    pub(crate) kl: Option<Tensor<O::Tape, 1>>,
+    pub(crate) kl: Option<Divergence<O>>,
+}
+
+/// KL(q(z | scene, maps) ‖ N(0, I)), mean over clouds (nats).
+#[derive(Debug)]
+pub(crate) struct Divergence<O: Operations> {
+    /// All of it.
+    pub(crate) whole: Tensor<O::Tape, 1>,
+    /// What the objective charges for: Σⱼ max(λ, KLⱼ), KLⱼ the mean of the j-th number of the code (Kingma et al. 2016, eq. 15).
+    pub(crate) charged: Tensor<O::Tape, 1>,
 }
 
 impl Cvae {
@@ -88,7 +98,17 @@ impl Cvae {
         let head = NormLinear::new(layout, "decoder.head", coarse, config.head);
         let context = PlainLinear::new(layout, "decoder.context", top, CONTEXT);
         let logits = ModulatedHead::new(layout, "decoder.logits", config.head, latent + CONTEXT, FINGERS);
-        Self { scene, posterior, decoder, head, context, logits, placement: config.latent_placement, latent_size: latent }
+        Self {
+            scene,
+            posterior,
+            decoder,
+            head,
+            context,
+            logits,
+            placement: config.latent_placement,
+            latent_size: latent,
+            free_bits: config.free_bits,
+        }
     }
 
     /// Z, or zero without latent code.
@@ -119,7 +139,7 @@ impl Cvae {
                 let rows = constant(batch.posterior_features.clone(), FEATURES + FINGERS);
                 posterior.forward(pass, batch.clouds, &down, &rows, constant(batch.map_means.clone(), MAP_MEANS))
             };
-            kl = Some(divergence::<O>(mean.clone(), log_variance.clone()).div_scalar(batch.clouds as f32));
+            kl = Some(Divergence::new(mean.clone(), log_variance.clone(), self.free_bits));
             mean + log_variance.mul_scalar(0.5).exp() * constant(noise, self.latent_size)
         });
         let levels = self.scene.len();
@@ -177,11 +197,16 @@ fn pool_clouds<O: Operations>(top: Rows<O>, clouds: usize) -> Rows<O> {
     O::max_pool(top, rows / clouds)
 }
 
-/// Σ over rows and columns of ½ (μ² + σ² − 1 − ln σ²): KL(N(μ, σ²) ‖ N(0, 1)) (Kingma & Welling 2014, appendix B).
-fn divergence<O: Operations>(mean: Rows<O>, log_variance: Rows<O>) -> Tensor<O::Tape, 1> {
-    let terms = mean.powi_scalar(2) + log_variance.clone().exp() - log_variance - 1.0;
-    // Not `sum`: on a GPU burn adds that up in whatever order its threads come.
-    terms.sum_dim(1).sum_dim(0).reshape([1]).mul_scalar(0.5)
+impl<O: Operations> Divergence<O> {
+    /// Of clouds × Z: ½ (μ² + σ² − 1 − ln σ²), KL(N(μ, σ²) ‖ N(0, 1)) of each number (Kingma & Welling 2014, appendix B).
+    fn new(mean: Rows<O>, log_variance: Rows<O>, free_bits: f32) -> Self {
+        let clouds = mean.dims()[0];
+        let terms = mean.powi_scalar(2) + log_variance.clone().exp() - log_variance - 1.0;
+        // Not `sum`: on a GPU burn adds that up in whatever order its threads come.
+        let each = terms.sum_dim(0).mul_scalar(0.5 / clouds as f32);
+        let total = |each: Rows<O>| each.sum_dim(1).reshape([1]);
+        Self { whole: total(each.clone()), charged: total(each.clamp_min(free_bits)) }
+    }
 }
 
 impl ModelKind {
@@ -190,5 +215,26 @@ impl ModelKind {
         let mut layout = Layout::default();
         let cvae = Cvae::new(&mut layout, self, config);
         (layout, cvae)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::operations::Fused;
+
+    /// Two clouds, three numbers: the means of their divergences are 0.25, 1 and 0 nats, with λ = 0.5 only the second one is charged for.
+    #[test]
+    fn what_is_free_is_counted_at_its_price_and_pulls_at_nothing() {
+        let device: DeviceOf<Fused> = Default::default();
+        let rows = |values: [f32; 6]| Rows::<Fused>::from_data(TensorData::new(values.to_vec(), [2, 3]), &device);
+        let (mean, log_variance) = (rows([1.0, 0.0, 0.0, 0.0, 2.0, 0.0]).require_grad(), rows([0.0; 6]).require_grad());
+        let divergence = Divergence::<Fused>::new(mean.clone(), log_variance.clone(), 0.5);
+        assert!((divergence.whole.into_scalar() - 1.25).abs() < 1e-6);
+        assert!((divergence.charged.clone().into_scalar() - 2.0).abs() < 1e-6);
+        let tape = divergence.charged.backward();
+        let gradient = |of: &Rows<Fused>| of.grad(&tape).unwrap().into_data().to_vec::<f32>().unwrap();
+        assert_eq!(gradient(&mean), [0.0, 0.0, 0.0, 0.0, 1.0, 0.0]);
+        assert_eq!(gradient(&log_variance), [0.0; 6]);
     }
 }

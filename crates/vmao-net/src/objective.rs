@@ -14,7 +14,7 @@ use burn::tensor::{TensorData, Transaction};
 pub(crate) struct Objective {
     /// Both terms.
     pub(crate) terms: Elbo,
-    /// The gradient of reconstruction + β KL by every trained array of the layout.
+    /// The gradient of reconstruction + β KL, as far as that is charged for, by every trained array of the layout.
     pub(crate) gradients: Vec<Option<Vec<f32>>>,
     /// Mean and variance arrays, with the batch moments that move them.
     pub(crate) moments: Vec<(ParameterId, ParameterId, Moments)>,
@@ -37,7 +37,7 @@ pub(crate) fn objective<O: Operations>(
     let terms = cvae.objective(&mut pass, batch, noise, device);
     let (reconstruction, kl) = (terms.reconstruction, terms.kl);
     let loss = match &kl {
-        Some(kl) => reconstruction.clone() + kl.clone().mul_scalar(beta),
+        Some(kl) => reconstruction.clone() + kl.charged.clone().mul_scalar(beta),
         None => reconstruction.clone(),
     };
     let tape = loss.backward();
@@ -45,7 +45,7 @@ pub(crate) fn objective<O: Operations>(
     let mut back = Transaction::default().register(reconstruction.inner());
     let has_kl = kl.is_some();
     if let Some(kl) = kl {
-        back = back.register(kl.inner());
+        back = back.register(kl.whole.inner());
     }
     let mut has_gradient = Vec::with_capacity(pass.weights.len());
     for weight in &pass.weights {

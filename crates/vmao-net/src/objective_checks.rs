@@ -31,6 +31,7 @@ fn tiny() -> NetworkConfig {
         latent_size: 3,
         latent_placement: LatentPlacement::EveryLevel,
         beta: 0.1,
+        free_bits: 0.0,
         warm_up: 0.0,
         ..NetworkConfig::small()
     }
