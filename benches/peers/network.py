@@ -144,6 +144,23 @@ def same_neighbours(found, file, config, points):
     return min(shares)
 
 
+def start(file, device="cpu"):
+    """The weights that a training of ours starts from."""
+    weights = {name[len("weight.") :]: value for name, value in file.items() if name.startswith("weight.")}
+    vectors = {name for name, value in weights.items() if len(value) == 1 and name.endswith(("bias", "norm.weight"))}
+    leaf = lambda name, value: (value.flatten() if name in vectors else value).clone().to(device).requires_grad_()
+    return {name: leaf(name, value) for name, value in weights.items()}
+
+
+def descend(model, optimiser, batch, noise, config):
+    """One training step; the loss before it, with the whole divergence."""
+    optimiser.zero_grad(set_to_none=True)
+    cross_entropy, kl, charged, _ = model.terms(batch, noise)
+    (cross_entropy + config["beta"] * charged).backward()
+    optimiser.step()
+    return (cross_entropy + config["beta"] * kl).item()
+
+
 def theirs(folder, layout, task):
     """One turn of the peer, in this process; prints what our example prints."""
     torch.set_num_threads(THREADS)
@@ -166,21 +183,14 @@ def theirs(folder, layout, task):
             answer |= {"difference": difference.item(), "code": timed(STEPS, code), "given": timed(STEPS, given)}
             answer["whole"] = timed(STEPS, lambda: (find_neighbours(points, config), given()))
     else:
-        weights = {name[len("weight.") :]: value for name, value in file.items() if name.startswith("weight.")}
-        vectors = {name for name, value in weights.items() if len(value) == 1 and name.endswith(("bias", "norm.weight"))}
-        weights = {name: (value.flatten() if name in vectors else value).clone().requires_grad_() for name, value in weights.items()}
+        weights = start(file)
         model, optimiser = network("vmao", config, weights), torch.optim.Adam(weights.values(), LEARNING_RATE)
         losses, clouds = [], file["points"].unflatten(0, (CLOUDS, -1))
 
         def step():
             if task == "search":
                 find_neighbours(clouds, config)
-            optimiser.zero_grad(set_to_none=True)
-            cross_entropy, kl, _ = model.terms(batch, file["noise"])
-            loss = cross_entropy + config["beta"] * kl
-            loss.backward()
-            optimiser.step()
-            losses.append(loss.item())
+            losses.append(descend(model, optimiser, batch, file["noise"], config))
 
         if task == "search":
             answer["same"] = same_neighbours(find_neighbours(clouds, config), file, config, batch.sizes[0])

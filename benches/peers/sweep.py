@@ -1,7 +1,7 @@
-"""A sweep over sizes and constants of the network, one at a time about the shipped ones: `sweep.py FOLDER OBJECT EPOCHS TRIALS [VARIANT]...`
+"""A sweep over sizes and constants of the network, one at a time about the shipped ones: `sweep.py FOLDER OBJECT EPOCHS TRIALS SEEDS [VARIANT]...`
 
-Explores OBJECT once into FOLDER (seed 1, 200 successes, 2048 points a cloud), trains V-MAO on it for each variant with a quarter of the examples held out
-(the same ones for all), and lets the networks grasp in TRIALS parallel trials on held-out instances. What FOLDER already holds is not run again. Prints a table;
+Explores OBJECT once into FOLDER (seed 1, 200 successes), trains V-MAO on it for each variant and each seed below SEEDS with a quarter of the examples
+held out (the same ones for all variants), and lets the networks grasp in TRIALS parallel trials on held-out instances. What FOLDER already holds is not run again. Prints a table;
 VMAO names a program to use instead of a fresh build.
 """
 
@@ -47,6 +47,7 @@ VARIANTS = {
     "widths doubled": widths(2),
     "Z 8": ["network.latent_size=8"],
     "beta 0.1": ["network.beta=0.1"],
+    "no free bits": ["network.free_bits=0"],
     "label 4 mm": ["network.label_sigma=0.004"],
     "label 9 mm": ["network.label_sigma=0.009"],
     "no colour change": ["train.augmentation.color_gain=0.0"],
@@ -71,29 +72,31 @@ def settings(values):
 
 
 def main():
-    folder, name, epochs, trials, *chosen = sys.argv[1:]
+    folder, name, epochs, trials, seeds, *chosen = sys.argv[1:]
     folder = Path(folder) / name
     folder.mkdir(parents=True, exist_ok=True)
     program = os.environ.get("VMAO") or peer.cargo("vmao", "bin", "vmao")
-    scene = [f'object.name="{name}"', "cameras.points=2048", "network.points=2048", *SCENES[name]]
+    scene = [f'object.name="{name}"', *SCENES[name]]
     data = folder / "data"
     run(folder / "data.json", program, "explore", "--json", "--workers", 1, "--seed", 1, "--successes", 200, "--max-trials", 500, *settings(scene), "--out", data)
     rows = []
-    for variant in chosen or VARIANTS:
+    for variant, seed in [(variant, seed) for variant in chosen or VARIANTS for seed in range(int(seeds))]:
         own = settings([*scene, f"train.epochs={epochs}", "train.validation_fraction=0.25", 'evaluate.methods=["vmao"]', *VARIANTS[variant]])
-        place = folder / variant.replace(" ", "-")
+        place = folder / f"{variant.replace(' ', '-')}-{seed}"
         log = lambda what: folder / f"{place.name}.{what}.json"
-        trained, seconds = run(log("train"), program, "train", "--json", "--workers", 1, "--data", data, "--model", "vmao", *own, "--out", place)
-        results, _ = run(log("evaluate"), program, "evaluate", "--json", "--workers", 1, "--checkpoint", place, "--order", "parallel", "--trials", trials, *own, "--out", folder / f"{place.name}.results")
+        command = lambda name, *rest: (program, name, "--json", "--workers", 1, "--seed", seed, *rest, *own, "--out")
+        trained, seconds = run(log("train"), *command("train", "--data", data, "--model", "vmao"), place)
+        tried = command("evaluate", "--checkpoint", place, "--order", "parallel", "--trials", trials)
+        results, _ = run(log("evaluate"), *tried, folder / f"{place.name}.results")
         cell = results["cells"][0]
-        terms = trained["validation"]
+        terms = list(trained["validation"].values())
         entropy = " ".join(f"{t['reconstruction']:.2f}" for t in terms)
         divergence = " ".join(f"{t['kl']:.2f}" for t in terms)
         contact = sum(cell["failures"][stage] for stage in ["no-contact", "unreachable"])
-        rows.append([variant, entropy, divergence, f"{cell['successes']} of {cell['trials']}", contact, f"{seconds:.0f}"])
+        rows.append([variant, seed, entropy, divergence, f"{cell['successes']} of {cell['trials']}", contact, f"{seconds:.0f}"])
         print(rows[-1], file=sys.stderr, flush=True)
     print(f"\n{name}, {epochs} epochs\n")
-    peer.table(["variant", "cross-entropy", "KL", "succeeded", "no grasp found", "training CPU s"], rows)
+    peer.table(["variant", "seed", "cross-entropy", "KL", "succeeded", "no grasp found", "training CPU s"], rows)
 
 
 if __name__ == "__main__":

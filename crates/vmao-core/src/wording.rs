@@ -4,18 +4,29 @@ use std::fmt::{self, Display};
 
 /// Names longer than this are cut in messages.
 const NAME_LENGTH: usize = 60;
+/// Excerpts longer than this are cut in messages: room for a configuration's field, its type and twenty names.
+const EXCERPT_LENGTH: usize = 600;
 /// Lists longer than this are cut in messages.
 const LIST_LENGTH: usize = 20;
 
 /// A name in backticks, escaped and cut so that hostile input cannot spoil a terminal.
 pub fn quoted(name: &str) -> String {
-    let cut = name.char_indices().nth(NAME_LENGTH).map_or(name, |(end, _)| &name[..end]);
-    let dots = if cut.len() < name.len() { "…" } else { "" };
+    format!("`{}`", shown(name, NAME_LENGTH))
+}
+
+/// What a library says of hostile input, or a value of it, escaped and cut likewise but longer.
+pub fn excerpt(text: &str) -> String {
+    shown(text, EXCERPT_LENGTH)
+}
+
+fn shown(text: &str, most: usize) -> String {
+    let cut = text.char_indices().nth(most).map_or(text, |(end, _)| &text[..end]);
+    let dots = if cut.len() < text.len() { "…" } else { "" };
     let shown = |letter: char| match letter {
         '"' | '\'' | '\\' => letter.to_string(),
         _ => letter.escape_debug().to_string(),
     };
-    format!("`{}{dots}`", cut.chars().map(shown).collect::<String>())
+    cut.chars().map(shown).collect::<String>() + dots
 }
 
 /// The names, comma-separated; cut with a count if there are many.
@@ -77,6 +88,8 @@ mod tests {
     fn hostile_names_are_escaped_and_cut() {
         assert_eq!(quoted("\u{1b}[31m\n"), "`\\u{1b}[31m\\n`");
         assert!(quoted(&"ä".repeat(10_000)).chars().count() < 70);
+        assert_eq!(excerpt("unknown field `a`\u{7}"), "unknown field `a`\\u{7}");
+        assert!(excerpt(&"ä".repeat(10_000)).chars().count() < 610);
         let many: Vec<String> = (0..1000).map(|i| format!("part-{i}")).collect();
         assert!(listed(many.iter().map(String::as_str)).ends_with("part-19, … (1000 in all)"));
     }

@@ -1,6 +1,6 @@
 //! Times training steps and sampled maps of one network; driven by `benches/peers/network.py`.
 //!
-//! `network_step DIR CLOUDS THREADS STEPS export|step|search|map`: DIR holds `network.json`. `export` writes the batch as
+//! `network_step DIR CLOUDS THREADS STEPS export|step|search|map [cpu|cuda]`: DIR holds `network.json`. `export` writes the batch as
 //! DIR/batch.safetensors, a network after three steps as DIR/warmed.safetensors and its map as DIR/map.json; the others print CPU
 //! seconds and wall seconds of each of STEPS repetitions, losses, and peak memory.
 
@@ -15,7 +15,7 @@ use std::error::Error;
 use std::fs;
 use std::path::Path;
 use std::time::Instant;
-use vmao_net::{ContactNetwork, Example, ModelKind, NetworkConfig, Rehearsal};
+use vmao_net::{ContactNetwork, Device, Example, ModelKind, NetworkConfig, Rehearsal};
 
 /// Points of one scene of the bar world.
 const SCENE: usize = 1020;
@@ -26,8 +26,14 @@ const LATENT: f32 = 0.5;
 
 fn main() -> Result<(), Box<dyn Error>> {
     let arguments: Vec<String> = std::env::args().collect();
-    let [_, folder, clouds, threads, steps, what] = arguments.as_slice() else {
-        return Err("usage: network_step DIR CLOUDS THREADS STEPS export|step|search|map".into());
+    let [_, folder, clouds, threads, steps, what, rest @ ..] = arguments.as_slice() else {
+        return Err("usage: network_step DIR CLOUDS THREADS STEPS export|step|search|map [cpu|cuda]".into());
+    };
+    let device = match rest {
+        [] => Device::Cpu,
+        [name] if name == "cpu" => Device::Cpu,
+        [name] if name == "cuda" => Device::cuda()?,
+        _ => return Err(format!("{rest:?}: expected cpu, cuda or nothing").into()),
     };
     rayon::ThreadPoolBuilder::new().num_threads(threads.parse()?).build_global()?;
     let folder = Path::new(folder);
@@ -36,7 +42,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let steps: usize = steps.parse()?;
     match what.as_str() {
         "export" => export(folder, &network, &examples),
-        "step" | "search" => train(&network, examples, steps, what == "search"),
+        "step" | "search" => train(&network, examples, steps, what == "search", device),
         "map" => sample(&network, &examples, steps),
         _ => Err(format!("{what}: expected export, step, search or map").into()),
     }
@@ -52,7 +58,7 @@ fn cloud(index: u64, points: usize) -> Example {
 
 /// A network whose running statistics have met the batch, so that maps are not flat.
 fn warmed(network: &NetworkConfig, examples: &[Example]) -> Result<Rehearsal, Box<dyn Error>> {
-    let mut rehearsal = Rehearsal::new(ModelKind::Vmao, network, examples.to_vec(), SEED)?;
+    let mut rehearsal = Rehearsal::new(ModelKind::Vmao, network, examples.to_vec(), SEED, Device::Cpu)?;
     for _ in 0..3 {
         rehearsal.step(LEARNING_RATE)?;
     }
@@ -60,7 +66,7 @@ fn warmed(network: &NetworkConfig, examples: &[Example]) -> Result<Rehearsal, Bo
 }
 
 fn export(folder: &Path, network: &NetworkConfig, examples: &[Example]) -> Result<(), Box<dyn Error>> {
-    let rehearsal = Rehearsal::new(ModelKind::Vmao, network, examples.to_vec(), SEED)?;
+    let rehearsal = Rehearsal::new(ModelKind::Vmao, network, examples.to_vec(), SEED, Device::Cpu)?;
     fs::write(folder.join("batch.safetensors"), rehearsal.to_safetensors()?)?;
     let warmed = warmed(network, examples)?;
     fs::write(folder.join("warmed.safetensors"), warmed.checkpoint().to_safetensors()?)?;
@@ -70,8 +76,14 @@ fn export(folder: &Path, network: &NetworkConfig, examples: &[Example]) -> Resul
     Ok(())
 }
 
-fn train(network: &NetworkConfig, examples: Vec<Example>, steps: usize, search: bool) -> Result<(), Box<dyn Error>> {
-    let mut rehearsal = Rehearsal::new(ModelKind::Vmao, network, examples, SEED)?;
+fn train(
+    network: &NetworkConfig,
+    examples: Vec<Example>,
+    steps: usize,
+    search: bool,
+    device: Device,
+) -> Result<(), Box<dyn Error>> {
+    let mut rehearsal = Rehearsal::new(ModelKind::Vmao, network, examples, SEED, device)?;
     let mut losses = vec![rehearsal.step(LEARNING_RATE)?];
     let times = timed(steps, || {
         if search {

@@ -40,6 +40,7 @@ NETWORK = {
     "latent_size": 3,
     "latent_placement": "every_level",
     "beta": 0.1,
+    "free_bits": 0.0,
     "warm_up": 0.0,
     "label_sigma": 0.012,
     "table_height": 0.003,
@@ -175,8 +176,8 @@ def mint(name, kind, config, seed):
         weights[array] = torch.tensor((start + scale * rng.standard_normal(shape)).astype(np.float32))
     tensors |= {f"weight.{array}": value for array, value in weights.items()}
     weights = {array: value.double().requires_grad_() for array, value in weights.items()}
-    loss, kl, logits = Network(kind, config, weights).terms(batch(clouds, config), noise.double())
-    (loss if kl is None else loss + config["beta"] * kl).backward()
+    loss, kl, charged, logits = Network(kind, config, weights).terms(batch(clouds, config), noise.double())
+    (loss if kl is None else loss + config["beta"] * charged).backward()
     tensors |= {f"gradient.{array}": value.grad.float() for array, value in weights.items()}
     tensors |= {f"cloud.{b}.logits": y.detach().float() for b, y in enumerate(logits)}
     tensors["reconstruction"] = loss.detach().float().reshape(1)
@@ -190,5 +191,5 @@ def mint(name, kind, config, seed):
 
 if __name__ == "__main__":
     mint("every_level", "vmao", NETWORK, 1)
-    mint("bottleneck", "vmao", NETWORK | {"latent_placement": "bottleneck", "density_power": 0.0}, 2)
+    mint("bottleneck", "vmao", NETWORK | {"latent_placement": "bottleneck", "density_power": 0.0, "free_bits": 0.3}, 2)  # one of three numbers says less
     mint("top1", "top1", NETWORK, 3)

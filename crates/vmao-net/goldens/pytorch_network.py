@@ -140,15 +140,16 @@ class Network:
         return self.head(self.norm_linear("decoder.head", coarse), torch.cat(modulators, 1), batch.sizes)
 
     def terms(self, batch, noise):
-        """Cross entropy, divergence (none without latent code) and the logits of each cloud."""
+        """Cross entropy, divergence (none without latent code), what of it the objective charges for, and the logits of each cloud."""
         scene = self.encode("scene", batch.features, batch.down)
-        kl, z = None, None
+        kl, charged, z = None, None, None
         if self.kind == "vmao":
             mean, log_variance = self.posterior(batch)
             deviation = (0.5 * log_variance).exp()
-            kl = 0.5 * (mean**2 + deviation**2 - 1.0 - log_variance).sum() / batch.clouds
+            each = 0.5 * (mean**2 + deviation**2 - 1.0 - log_variance).sum(0) / batch.clouds
+            kl, charged = each.sum(), each.clamp(min=self.config["free_bits"]).sum()
             z = mean + deviation * noise
         logits = self.decode(batch, scene, z)
         pairs = zip(logits, batch.targets.split(batch.sizes))
         loss = -sum((target * torch.log_softmax(y, 0)).sum() for y, target in pairs) / (2 * batch.clouds)
-        return loss, kl, logits
+        return loss, kl, charged, logits

@@ -7,6 +7,7 @@ use crate::parameters::Parameters;
 use crate::sealed::{Sealed, Sealing, Wanted};
 use crate::training::Elbo;
 use serde::{Deserialize, Serialize};
+use vmao_core::wording::excerpt;
 
 /// What a network of a kind and configuration learned, and how well.
 #[derive(Debug, Clone, PartialEq)]
@@ -78,7 +79,7 @@ impl Description {
         let parse = |text: &str| serde_json::from_str(text).map_err(|error| Error::ConfigJson { reason: error.to_string() });
         let (found, expected) = (parse(&self.to_json()?)?, parse(&expected.to_json()?)?);
         let (field, found, expected) = difference("", &found, &expected).unwrap_or_default();
-        Err(Error::Differs { what, field, found, expected, whose })
+        Err(Error::Differs { what, field: excerpt(&field), found: excerpt(&found), expected: excerpt(&expected), whose })
     }
 }
 
@@ -115,7 +116,7 @@ impl Checkpoint {
     /// Reads both again. Refuses what is not exactly a network of the described kind with finite weights, as it was written.
     pub fn from_safetensors(bytes: &[u8], config_json: &str) -> Result<Self, Error> {
         let outside: Description =
-            serde_json::from_str(config_json).map_err(|error| Error::ConfigJson { reason: error.to_string() })?;
+            serde_json::from_str(config_json).map_err(|error| Error::ConfigJson { reason: excerpt(&error.to_string()) })?;
         outside.validate()?;
         let mut file = Sealed::open(bytes)?;
         let (layout, _) = outside.kind.layers(&outside.network);

@@ -3,6 +3,7 @@
 use crate::error::Error;
 use serde::{Deserialize, Serialize};
 use std::fmt::Display;
+use vmao_core::wording::excerpt;
 
 /// With or without a latent code.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
@@ -270,7 +271,7 @@ fn check(field: &str, found: impl Display, holds: bool, expected: &str) -> Resul
     if holds {
         return Ok(());
     }
-    Err(Error::Config { field: field.to_owned(), found: found.to_string(), expected: expected.to_owned() })
+    Err(Error::Config { field: field.to_owned(), found: excerpt(&found.to_string()), expected: expected.to_owned() })
 }
 
 fn widths(field: &str, channels: &[usize]) -> Result<(), Error> {

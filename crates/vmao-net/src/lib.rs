@@ -5,6 +5,7 @@
 //! predicts on plain slices. Opens no files and knows no simulator.
 
 pub mod neighbours;
+pub mod readers;
 
 mod adam;
 mod augment;

@@ -26,9 +26,15 @@ pub struct Rehearsal {
 }
 
 impl Rehearsal {
-    /// One batch of all `examples`; the network starts, and the latent noise is drawn, from `seed`.
-    pub fn new(kind: ModelKind, network: &NetworkConfig, examples: Vec<Example>, seed: u64) -> Result<Self, Error> {
-        let (training, device) = (TrainingConfig::small(), Device::Cpu);
+    /// One batch of all `examples`; the network starts, and the latent noise is drawn, from `seed`. Steps are computed on `device`.
+    pub fn new(
+        kind: ModelKind,
+        network: &NetworkConfig,
+        examples: Vec<Example>,
+        seed: u64,
+        device: Device,
+    ) -> Result<Self, Error> {
+        let training = TrainingConfig::small();
         let lesson = Lesson { kind, network, training: &training, examples: &examples, seed, device };
         lesson.check()?;
         let description = lesson.description();
@@ -138,7 +144,7 @@ mod tests {
     #[test]
     fn a_search_finds_the_same_batch_and_steps_go_downhill() {
         let network = NetworkConfig::small();
-        let mut rehearsal = Rehearsal::new(ModelKind::Vmao, &network, vec![example(0), example(1)], 5).unwrap();
+        let mut rehearsal = Rehearsal::new(ModelKind::Vmao, &network, vec![example(0), example(1)], 5, Device::Cpu).unwrap();
         let before = rehearsal.to_safetensors().unwrap();
         rehearsal.search();
         assert_eq!(before, rehearsal.to_safetensors().unwrap());
@@ -151,7 +157,7 @@ mod tests {
     #[test]
     fn the_batch_names_every_neighbour_by_its_row() {
         let network = NetworkConfig::small();
-        let rehearsal = Rehearsal::new(ModelKind::Vmao, &network, vec![example(0), example(1)], 5).unwrap();
+        let rehearsal = Rehearsal::new(ModelKind::Vmao, &network, vec![example(0), example(1)], 5, Device::Cpu).unwrap();
         let bytes = rehearsal.to_safetensors().unwrap();
         let file = SafeTensors::deserialize(&bytes).unwrap();
         assert_eq!(file.tensor("features").unwrap().shape(), [460, 9]);

@@ -9,6 +9,7 @@ use safetensors::{Dtype, SafeTensorError, SafeTensors, tensor::TensorView};
 use serde::{Serialize, de::DeserializeOwned};
 use sha2::{Digest, Sha256};
 use std::collections::BTreeMap;
+use vmao_core::wording::excerpt;
 
 /// Name of the metadata's entry.
 const ENTRY: &str = "vmao";
@@ -55,7 +56,7 @@ pub(crate) struct Sealed<'a> {
 impl<'a> Sealed<'a> {
     /// Reads the file's header.
     pub(crate) fn open(bytes: &'a [u8]) -> Result<Self, Error> {
-        let refuse = |reason: String| Error::NotSafetensors { bytes: bytes.len(), reason };
+        let refuse = |reason: String| Error::NotSafetensors { bytes: bytes.len(), reason: excerpt(&reason) };
         let (_, header) = SafeTensors::read_metadata(bytes).map_err(|error| refuse(error.to_string()))?;
         let file = SafeTensors::deserialize(bytes).map_err(|error| refuse(error.to_string()))?;
         let entry = header.metadata().as_ref().and_then(|entries| entries.get(ENTRY));
@@ -70,7 +71,7 @@ impl<'a> Sealed<'a> {
 
     /// The description.
     pub(crate) fn description<D: DeserializeOwned>(&self) -> Result<D, Error> {
-        serde_json::from_str(&self.text).map_err(|error| Error::ConfigJson { reason: error.to_string() })
+        serde_json::from_str(&self.text).map_err(|error| Error::ConfigJson { reason: excerpt(&error.to_string()) })
     }
 
     /// The arrays of a layout under `prefix`: all, or those that are trained.
@@ -92,7 +93,7 @@ impl<'a> Sealed<'a> {
         if view.dtype() != Dtype::F32 || view.shape() != expected {
             return Err(Error::TensorShape {
                 name: name.to_owned(),
-                found: format!("{:?} {:?}", view.dtype(), view.shape()),
+                found: excerpt(&format!("{:?} {:?}", view.dtype(), view.shape())),
                 expected: format!("{:?} {expected:?}", Dtype::F32),
             });
         }
@@ -109,13 +110,13 @@ impl<'a> Sealed<'a> {
     /// Refuses a file with arrays that nobody asked for, and one that is not as it was written.
     pub(crate) fn finish(self, of_what: &str) -> Result<(), Error> {
         if let Some(name) = self.left.first() {
-            return Err(Error::UnknownTensor { name: name.clone(), kind: of_what.to_owned() });
+            return Err(Error::UnknownTensor { name: excerpt(name), kind: of_what.to_owned() });
         }
         let mut views = self.file.tensors();
         views.sort_unstable_by(|(a, _), (b, _)| a.cmp(b));
         let found = digest(&self.text, views.iter().map(|(name, view)| (name.as_str(), view.data())));
         if found != self.digest {
-            return Err(Error::Altered { found, expected: self.digest });
+            return Err(Error::Altered { found, expected: excerpt(&self.digest) });
         }
         Ok(())
     }

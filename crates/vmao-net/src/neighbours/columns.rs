@@ -6,6 +6,23 @@ pub(crate) const LANES: usize = 16;
 /// Queries that one task of a parallel search answers.
 pub(super) const TASK: usize = 128;
 
+/// The lanes for which `holds`, in ascending order.
+#[inline(always)]
+pub(super) fn chosen(holds: impl Fn(usize) -> bool) -> impl Iterator<Item = usize> {
+    let mut mask = 0_u32;
+    for lane in 0..LANES {
+        mask |= u32::from(holds(lane)) << lane;
+    }
+    std::iter::from_fn(
+        #[inline(always)]
+        move || {
+            let lane = mask.trailing_zeros() as usize;
+            mask &= mask.wrapping_sub(1);
+            (lane < LANES).then_some(lane)
+        },
+    )
+}
+
 /// Coordinates of points, a group after the other; the last one is filled up with points infinitely far away.
 #[derive(Debug, Clone)]
 pub(crate) struct Columns {

@@ -3,6 +3,7 @@
 //! All in f32 on world-frame points (m), all deterministic: of equal candidates the lower index wins.
 
 mod ball;
+mod boxes;
 pub(crate) mod columns;
 mod farthest;
 mod nearest;
