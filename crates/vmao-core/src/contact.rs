@@ -59,15 +59,53 @@ impl ContactMap {
         })
     }
 
-    /// The point of each finger about which most of its probability lies, [`Self::masses`]. Ties go to the lower index.
-    pub fn peaks(&self, points: &[[f32; 3]], radius: f32) -> [usize; 2] {
-        self.masses(points, radius).map(|masses| largest(&masses))
+    /// The pair of points, one for each finger, with the largest product of [`Self::masses`] among those that the gripper spans:
+    /// `span` are its least and its largest distance between fingers (m). Ties go to the lower indices.
+    ///
+    /// If it spans no pair, the largest of each finger.
+    pub fn peaks(&self, points: &[[f32; 3]], radius: f32, span: [f32; 2]) -> Peaks {
+        let masses = self.masses(points, radius);
+        let [first, second] = masses.each_ref().map(|masses| ranked(masses));
+        let spanned = |a: usize, b: usize| {
+            let squared = (0..3).map(|axis| (points[a][axis] - points[b][axis]).powi(2)).sum::<f32>();
+            (span[0]..=span[1]).contains(&squared.sqrt())
+        };
+        let mut best: Option<Peaks> = None;
+        for &a in &first {
+            // Both lists fall, so that what follows the first spanned or lesser product is no better.
+            for &b in &second {
+                let mass = masses[0][a] * masses[1][b];
+                if best.as_ref().is_some_and(|best| mass <= best.mass) {
+                    break;
+                }
+                if spanned(a, b) {
+                    best = Some(Peaks { points: [a, b], mass });
+                    break;
+                }
+            }
+        }
+        best.unwrap_or_else(|| {
+            let points = [first, second].map(|ranked| ranked.first().copied().unwrap_or(0));
+            let mass = points.iter().zip(&masses).map(|(&point, masses)| masses.get(point).copied().unwrap_or(0.0)).product();
+            Peaks { points, mass }
+        })
     }
 }
 
-/// The index of the largest value, the lowest of equals.
-pub fn largest(values: &[f32]) -> usize {
-    (0..values.len()).fold(0, |best, i| if values[i] > values[best] { i } else { best })
+/// The peaks of a map's two fingers.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Peaks {
+    /// Indices of cloud points, of finger 1 and finger 2.
+    pub points: [usize; 2],
+    /// The product of the probabilities about them.
+    pub mass: f32,
+}
+
+/// The indices of the values above zero, largest first, the lower index of equals first.
+fn ranked(values: &[f32]) -> Vec<usize> {
+    let mut order: Vec<usize> = (0..values.len()).filter(|&i| values[i] > 0.0).collect();
+    order.sort_by(|&a, &b| values[b].total_cmp(&values[a]));
+    order
 }
 
 #[cfg(test)]
@@ -84,13 +122,14 @@ mod tests {
         let mut channel: Vec<f32> = points.iter().enumerate().map(|(i, p)| density(p[0]) * spacing(i)).collect();
         let total: f32 = channel.iter().sum();
         channel.iter_mut().for_each(|p| *p /= total);
-        assert!(points[largest(&channel)][0] > 0.045, "the most probable single point stands for more surface");
+        let single = ranked(&channel)[0];
+        assert!(points[single][0] > 0.045, "the most probable single point stands for more surface");
         let map = ContactMap { fingers: [channel.clone(), channel] };
-        for peak in map.peaks(&points, 0.012) {
+        for peak in map.peaks(&points, 0.012, [0.0, 1.0]).points {
             assert!((points[peak][0] - 0.03).abs() < 0.002, "{}", points[peak][0]);
         }
         // Within a radius smaller than all distances each point stands for itself.
-        assert_eq!(map.peaks(&points, 1e-5), [largest(&map.fingers[0]); 2]);
+        assert_eq!(map.peaks(&points, 1e-5, [0.0, 1.0]).points, [single; 2]);
     }
 
     #[test]
@@ -101,6 +140,26 @@ mod tests {
         let expected = [0.5 + 0.75 * 0.3, 0.3 + 0.75 * 0.5, 0.2];
         assert!(first.iter().zip(expected).all(|(m, e)| (m - e).abs() < 1e-6), "{first:?}");
         assert_eq!((second[0], second[1]), (0.0, 0.0));
-        assert_eq!(map.peaks(&points, 0.01), [0, 2]);
+        assert_eq!(map.peaks(&points, 0.01, [0.0, 1.0]).points, [0, 2]);
+    }
+
+    #[test]
+    fn peaks_are_the_best_pair_that_a_gripper_spans() {
+        let points = [[0.0, 0.0, 0.0], [0.01, 0.0, 0.0], [0.03, 0.0, 0.0], [0.07, 0.0, 0.0]];
+        let map = ContactMap { fingers: [vec![0.4, 0.3, 0.2, 0.1], vec![0.41, 0.1, 0.19, 0.3]] };
+        let peaks = |span| map.peaks(&points, 1e-3, span);
+        // In one place, then 3 cm apart, then the widest; and all pairs by brute force.
+        assert_eq!((peaks([0.0, 1.0]).points, peaks([0.005, 0.05]).points, peaks([0.07, 0.08]).points), ([0, 0], [1, 0], [0, 3]));
+        for span in [[0.0, 0.02], [0.015, 0.025], [0.03, 0.06], [0.05, 0.2]] {
+            let spans = |(a, b): &(usize, usize)| {
+                let distance: f32 = points[*a][0] - points[*b][0];
+                (span[0]..=span[1]).contains(&distance.abs())
+            };
+            let product = |(a, b): (usize, usize)| map.fingers[0][a] * map.fingers[1][b];
+            let best = (0..16).map(|k| (k / 4, k % 4)).filter(spans).map(product).fold(0.0, f32::max);
+            assert_eq!(peaks(span).mass, best, "{span:?}");
+        }
+        // No pair is so far apart: each finger for itself.
+        assert_eq!(peaks([0.1, 0.2]).points, [0, 0]);
     }
 }

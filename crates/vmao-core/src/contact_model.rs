@@ -15,6 +15,8 @@ pub struct ContactQuery<'a> {
     pub part: PartId,
     /// The scene now, world frame.
     pub observation: &'a Observation,
+    /// The least and the largest distance between two fingers' points that the gripper can hold (m).
+    pub span: [f64; 2],
     /// Where the part is. Exploration knows it; learned models must not look.
     pub world_from_part: &'a Pose,
 }

@@ -90,10 +90,20 @@ pub struct Gripper {
     pub hand_from_tool: Pose,
 }
 
+/// The thinnest thing that is held (m): nearer contacts lie on one side of it.
+const THINNEST: f64 = 0.006;
+/// Room that the open pads leave beside the widest thing that is held (m).
+const OPEN_ROOM: f64 = 0.004;
+
 impl Gripper {
     /// The widest thing that fits between the pads (m).
     pub fn max_opening(&self) -> f64 {
         self.closed_gap + 2.0 * self.travel
+    }
+
+    /// The least and the largest distance between the contacts of two fingers that it can hold (m).
+    pub fn span(&self) -> [f64; 2] {
+        [self.closed_gap.max(THINNEST), self.max_opening() - OPEN_ROOM]
     }
 
     /// Shorter edge of the narrower pad's face (m); zero for pads that touch in a line or point.

@@ -185,7 +185,8 @@ impl<'a> Attempt<'a> {
         for grasp in step {
             let part = self.sequence[grasp];
             let world_from_part = state.world_from_parts[usize::from(part.0)];
-            let query = ContactQuery { grasp, part, observation: &observation, world_from_part: &world_from_part };
+            let span = self.scene.robots[usize::from(self.arms[usize::from(part.0)].0)].gripper.span();
+            let query = ContactQuery { grasp, part, observation: &observation, span, world_from_part: &world_from_part };
             let mut stream = Stream::new(self.seed, &[self.index, Draw::Contacts as u64, grasp as u64]);
             let proposals = time(Stage::Proposal, || model.propose(&query, &mut stream));
             let Some(&fingers) = proposals.first() else {

@@ -139,8 +139,7 @@ pub(crate) fn reachable_grasps(
 
 /// The gap to open the pads to (m) for contacts `width` (m) apart; none if the gripper does not open so far.
 pub(crate) fn opening_for(robot: &RobotModel, config: &GraspConfig, width: f64) -> Option<f64> {
-    let most = robot.gripper.max_opening();
-    (width <= most - 0.004).then(|| (width + config.opening_margin).min(most))
+    (width <= robot.gripper.span()[1]).then(|| (width + config.opening_margin).min(robot.gripper.max_opening()))
 }
 
 /// The gripper pose raised back along its approach until the fingertips clear the table; none if that takes too much.

@@ -4,7 +4,7 @@ use crate::config::EvaluateConfig;
 use crate::results::Method;
 use nalgebra::Point3;
 use serde::{Deserialize, Serialize};
-use vmao_core::contact::{ContactMap, largest};
+use vmao_core::contact::ContactMap;
 use vmao_core::contact_model::{ContactModel, ContactQuery, FingerPoints};
 use vmao_core::random::Stream;
 use vmao_net::{ContactNetwork, ModelKind};
@@ -13,7 +13,7 @@ use vmao_net::{ContactNetwork, ModelKind};
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Draw {
-    /// The point of each finger about which most of its probability lies.
+    /// The points of the two fingers about which most probability lies, of those that the gripper spans.
     Peak,
     /// A point of each finger drawn with its probability.
     Sample,
@@ -69,15 +69,14 @@ fn ranked(pairs: impl Iterator<Item = (f32, [usize; 2])>) -> Vec<[usize; 2]> {
 }
 
 /// A map's peaks with the product of the probabilities about them.
-fn weighed_peaks(map: &ContactMap, points: &[[f32; 3]], radius: f32) -> (f32, [usize; 2]) {
-    let masses = map.masses(points, radius);
-    let peaks = masses.each_ref().map(|masses| largest(masses));
-    (masses[0][peaks[0]] * masses[1][peaks[1]], peaks)
+fn weighed_peaks(map: &ContactMap, points: &[[f32; 3]], radius: f32, span: [f32; 2]) -> (f32, [usize; 2]) {
+    let peaks = map.peaks(points, radius, span);
+    (peaks.mass, peaks.points)
 }
 
 /// The different peaks of these maps on the cloud `points` (m), those with most probability about them first.
-pub fn ranked_peaks(maps: &[ContactMap], points: &[[f32; 3]], radius: f32) -> Vec<[usize; 2]> {
-    ranked(maps.iter().map(|map| weighed_peaks(map, points, radius)))
+pub fn ranked_peaks(maps: &[ContactMap], points: &[[f32; 3]], radius: f32, span: [f32; 2]) -> Vec<[usize; 2]> {
+    ranked(maps.iter().map(|map| weighed_peaks(map, points, radius, span)))
 }
 
 impl ContactModel for LearnedContacts {
@@ -92,7 +91,7 @@ impl ContactModel for LearnedContacts {
         for _ in 0..self.samples {
             let Ok(map) = network.decode(&scene, &latent(network, stream)) else { continue };
             pairs.push(match self.draw {
-                Draw::Peak => weighed_peaks(&map, &seen.points, self.peak_radius as f32),
+                Draw::Peak => weighed_peaks(&map, &seen.points, self.peak_radius as f32, query.span.map(|width| width as f32)),
                 Draw::Sample => {
                     let pair = drawn_points(&map, stream);
                     (map.fingers[0][pair[0]] * map.fingers[1][pair[1]], pair)
@@ -128,6 +127,9 @@ mod tests {
             ContactMap { fingers: [channel.clone(), channel] }
         };
         let points = [[0.0; 3], [1.0, 0.0, 0.0], [2.0, 0.0, 0.0]];
-        assert_eq!(ranked_peaks(&[map(0.5, 0), map(0.9, 2), map(0.6, 0), map(0.7, 1)], &points, 0.01), [[2, 2], [1, 1], [0, 0]]);
+        assert_eq!(
+            ranked_peaks(&[map(0.5, 0), map(0.9, 2), map(0.6, 0), map(0.7, 1)], &points, 0.01, [0.0, 1.0]),
+            [[2, 2], [1, 1], [0, 0]]
+        );
     }
 }

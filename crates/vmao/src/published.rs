@@ -31,8 +31,11 @@ fn percent(successes: u64, trials: u64) -> String {
     format!("{:.1} [{low:.1}, {high:.1}]", 100.0 * successes as f64 / trials.max(1) as f64)
 }
 
-/// The results of a run as a Markdown table: rates with Wilson 95 % intervals, the paper's, McNemar against Top-1,
-/// failures by stage, simulated seconds of a trial (`timestep` in s).
+/// Scales of all thresholds together at which successes are counted again, so that no threshold flatters.
+const SCALES: [f64; 6] = [0.05, 0.1, 0.25, 0.5, 1.0, 2.0];
+
+/// The results of a run as Markdown tables: rates with Wilson 95 % intervals, the paper's, McNemar against Top-1,
+/// failures by stage, simulated seconds of a trial (`timestep` in s); then rates with all thresholds scaled.
 pub fn markdown(results: &Results, lines: &[TrialLine], timestep: f64) -> String {
     let stages = FailureStage::ALL.map(FailureStage::name).join(" | ");
     let mut text = format!(
@@ -55,6 +58,21 @@ pub fn markdown(results: &Results, lines: &[TrialLine], timestep: f64) -> String
         text += &format!(
             "| {order} | {method} | {successes}/{trials} | {rate} | {paper} | {against} | {failures} | {seconds:.1} |\n"
         );
+    }
+    text + "\n" + &scaled(results, lines)
+}
+
+/// Rates (%) with the thresholds of position, rotation and joints multiplied by each of [`SCALES`].
+fn scaled(results: &Results, lines: &[TrialLine]) -> String {
+    let heads = SCALES.map(|scale| format!("× {scale}")).join(" | ");
+    let mut text = format!("| order | method, % at thresholds | {heads} |\n|{}\n", "---|".repeat(2 + SCALES.len()));
+    for cell in &results.cells {
+        let (order, method) = (cell.order(), cell.method());
+        let factors: Vec<Option<f64>> =
+            lines.iter().filter(|line| line.order == order && line.method == method).map(|line| line.threshold_factor).collect();
+        let met = |scale: f64| factors.iter().flatten().filter(|factor| **factor <= scale).count();
+        let rates = SCALES.map(|scale| format!("{:.1}", 100.0 * met(scale) as f64 / factors.len().max(1) as f64)).join(" | ");
+        text += &format!("| {} | {} | {rates} |\n", order.name(), method.title());
     }
     text
 }

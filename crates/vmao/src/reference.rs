@@ -10,6 +10,7 @@ use crate::failure::{Failure, OrBadInput};
 use crate::interruption::keeps;
 use crate::output::progress_bar;
 use crate::scenes::scenes;
+use crate::scoring::PeakRules;
 use rayon::prelude::*;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -91,6 +92,13 @@ impl<'a> Grounds<'a> {
     /// The configuration of the run.
     pub fn config(&self) -> &Config {
         self.config
+    }
+
+    /// What peaks are in a place: any of its grippers spans them.
+    pub(crate) fn peak_rules(&self, place: Place) -> PeakRules {
+        let spans = self.scene(place).robots.iter().map(|robot| robot.gripper.span());
+        let span = spans.fold([f64::INFINITY, 0.0], |[low, high], [least, most]| [least.min(low), most.max(high)]);
+        PeakRules { radius: self.config.evaluate.peak_radius, distance: self.config.score.distance, span }
     }
 
     /// The scene of a place.

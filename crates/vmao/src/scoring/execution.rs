@@ -1,7 +1,7 @@
 //! Samples carried out: the same start and goal again and again, each time with the next sample of every grasp.
 
 use super::measure::{Models, code, draw_stream};
-use super::samplers::{Peaks, Sampler, pairs};
+use super::samplers::{PeakRules, Sampler, pairs};
 use crate::output::progress_bar;
 use crate::reference::{Grounds, Place};
 use nalgebra::Point3;
@@ -40,7 +40,7 @@ struct Numbered<'a> {
     number: usize,
     place: Place,
     seed: u64,
-    rules: Peaks,
+    rules: PeakRules,
     codes: usize,
 }
 
@@ -84,8 +84,7 @@ pub fn execute(grounds: &Grounds<'_>, places: &[Place], models: &Models, count: 
         .collect();
     let bar = progress_bar("execute", jobs.len() as u64);
     let run = |&(place, sampler, number): &(Place, Sampler, usize)| {
-        let widest = grounds.scene(place).robots.iter().map(|robot| robot.gripper.max_opening()).fold(0.0, f64::max);
-        let rules = Peaks { radius: grounds.config().evaluate.peak_radius, distance: config.distance, widest };
+        let rules = grounds.peak_rules(place);
         let model = Numbered { models, sampler, number, place, seed: grounds.seed(), rules, codes: config.codes };
         let record = grounds.trial(place, &model).record;
         bar.inc(1);

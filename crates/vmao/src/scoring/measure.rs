@@ -3,7 +3,7 @@
 use super::calibration::Rank;
 use super::grips::{Comparison, compare, left_out, mean, modes};
 use super::likelihood::{code_information, divergence, log_mean_exp, log_weight};
-use super::samplers::{Peaks, Sampler, pairs};
+use super::samplers::{PeakRules, Sampler, pairs};
 use crate::failure::Failure;
 use crate::learned_contacts::latent;
 use crate::output::progress_bar;
@@ -247,8 +247,7 @@ fn score_scene(
         });
         posterior_means.extend(bound.map(|bound| bound.mean));
     }
-    let gripper = grounds.scene(place).robots.iter().map(|robot| robot.gripper.max_opening()).fold(0.0, f64::max);
-    let rules = Peaks { radius: grounds.config().evaluate.peak_radius, distance: config.distance, widest: gripper };
+    let rules = grounds.peak_rules(place);
     let shown = contexts.len().min(config.contexts);
     let mut compared: Vec<BTreeMap<Sampler, Vec<Comparison>>> = Vec::new();
     let (mut samples, mut information) = (BTreeMap::new(), Vec::new());
@@ -322,7 +321,7 @@ fn in_part(world_from_part: &Pose, point: [f32; 3]) -> Point3<f64> {
 fn sample(
     context: &Context<'_>,
     (seed, place, part, number): (u64, Place, usize, usize),
-    rules: Peaks,
+    rules: PeakRules,
     count: usize,
 ) -> BTreeMap<Sampler, Vec<FingerPoints>> {
     let points = &context.grasp.observation.points;

@@ -19,5 +19,5 @@ pub use figures::{coverage_figure, reliability_figure, scene_figure};
 pub use grips::{Comparison, compare, diversity, grip_distance, modes};
 pub use likelihood::{code_information, divergence, log_mean_exp, log_weight};
 pub use measure::{Likelihoods, Models, SceneScore, Scored, score};
-pub use samplers::{Peaks, Sampler, pairs};
+pub use samplers::{PeakRules, Sampler, pairs};
 pub use summary::{Row, summarise, table};

@@ -16,7 +16,7 @@ pub enum Sampler {
     VmaoDraw,
     /// The peaks of as many codes as there are, the most probable first.
     VmaoRanked,
-    /// The most probable pairs of Top-1's map that are apart from each other and that a gripper spans.
+    /// The most probable pairs of Top-1's map that are apart from each other.
     Top1Peaks,
     /// Pairs drawn from Top-1's map.
     Top1Draw,
@@ -60,13 +60,13 @@ impl Sampler {
 
 /// What a map's peaks are, and what Top-1's must keep.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Peaks {
+pub struct PeakRules {
     /// Within which a peak's probability is counted (m): [`ContactMap::masses`].
     pub radius: f64,
     /// Top-1's pairs are at least this far apart: the farther of their fingers' distances (m).
     pub distance: f64,
-    /// The widest that a gripper opens (m).
-    pub widest: f64,
+    /// The least and the largest distance between fingers that a gripper spans (m).
+    pub span: [f64; 2],
 }
 
 /// At most `count` pairs of point indices from the maps of one model on one cloud, one map for each code.
@@ -76,17 +76,17 @@ pub fn pairs(
     sampler: Sampler,
     maps: &[ContactMap],
     points: &[[f32; 3]],
-    rules: Peaks,
+    rules: PeakRules,
     count: usize,
     streams: &dyn Fn(usize) -> Stream,
 ) -> Vec<[usize; 2]> {
-    let radius = rules.radius as f32;
+    let (radius, span) = (rules.radius as f32, rules.span.map(|width| width as f32));
     match sampler {
-        Sampler::VmaoPeak => maps.iter().take(count).map(|map| map.peaks(points, radius)).collect(),
+        Sampler::VmaoPeak => maps.iter().take(count).map(|map| map.peaks(points, radius, span).points).collect(),
         Sampler::VmaoDraw => {
             maps.iter().take(count).enumerate().map(|(code, map)| drawn_points(map, &mut streams(code))).collect()
         }
-        Sampler::VmaoRanked => ranked_peaks(maps, points, radius).into_iter().take(count).collect(),
+        Sampler::VmaoRanked => ranked_peaks(maps, points, radius, span).into_iter().take(count).collect(),
         Sampler::Top1Peaks => {
             maps.first().map_or_else(Vec::new, |map| separated_peaks(&map.masses(points, radius), points, rules, count))
         }
@@ -107,8 +107,8 @@ pub fn pairs(
 /// Points of each finger that are combined; the product of two less probable ones is never among the best that are looked at.
 const COMBINED: usize = 256;
 
-/// The pairs of the largest products of `masses`, each apart from all before, none wider than a gripper opens.
-fn separated_peaks(masses: &[Vec<f32>; 2], points: &[[f32; 3]], rules: Peaks, count: usize) -> Vec<[usize; 2]> {
+/// The pairs of the largest products of `masses`, each apart from all before, none that a gripper does not span.
+fn separated_peaks(masses: &[Vec<f32>; 2], points: &[[f32; 3]], rules: PeakRules, count: usize) -> Vec<[usize; 2]> {
     let best = |channel: &[f32]| {
         let mut order: Vec<usize> = (0..channel.len()).collect();
         order.sort_by(|&a, &b| channel[b].total_cmp(&channel[a]));
@@ -122,7 +122,7 @@ fn separated_peaks(masses: &[Vec<f32>; 2], points: &[[f32; 3]], rules: Peaks, co
     let mut all: Vec<(f32, [usize; 2])> = Vec::new();
     let second = best(&masses[1]);
     for a in best(&masses[0]) {
-        let spanned = second.iter().filter(|&&b| distance(a, b) <= rules.widest);
+        let spanned = second.iter().filter(|&&b| (rules.span[0]..=rules.span[1]).contains(&distance(a, b)));
         all.extend(spanned.map(|&b| (masses[0][a] * masses[1][b], [a, b])));
     }
     all.sort_by(|a, b| b.0.total_cmp(&a.0));
@@ -157,11 +157,11 @@ mod tests {
     #[test]
     fn separated_peaks_are_ranked_apart_and_within_the_gripper() {
         let (points, map) = line([0.4, 0.3, 0.2, 0.1], [0.05, 0.35, 0.1, 0.5]);
-        let rules = Peaks { radius: 1e-6, distance: 0.015, widest: 0.025 };
+        let rules = PeakRules { radius: 1e-6, distance: 0.015, span: [0.0, 0.025] };
         // 0-3 is too wide; 1-3 (0.15) is best; 0-1 (0.14) is 2 cm from it at finger 2; 1-1 and 2-3 are near one of them.
         let found = pairs(Sampler::Top1Peaks, from_ref(&map), &points, rules, 3, &stream);
         assert_eq!(found, [[1, 3], [0, 1], [2, 1]]);
-        let wide = Peaks { radius: 1e-6, distance: 1.0, widest: 1.0 };
+        let wide = PeakRules { radius: 1e-6, distance: 1.0, span: [0.0, 1.0] };
         assert_eq!(
             pairs(Sampler::Top1Peaks, from_ref(&map), &points, wide, 3, &stream),
             [[0, 3]],
@@ -172,7 +172,7 @@ mod tests {
     #[test]
     fn draws_follow_the_map_and_depend_on_their_number_only() {
         let (points, map) = line([0.0, 0.5, 0.5, 0.0], [1.0, 0.0, 0.0, 0.0]);
-        let rules = Peaks { radius: 1e-6, distance: 0.01, widest: 1.0 };
+        let rules = PeakRules { radius: 1e-6, distance: 0.01, span: [0.0, 1.0] };
         let draw = |count| pairs(Sampler::Top1Draw, from_ref(&map), &points, rules, count, &stream);
         let all = draw(400);
         assert_eq!(draw(7), all[..7]);
@@ -186,7 +186,7 @@ mod tests {
     fn codes_give_their_own_peaks_and_ranking_sorts_them() {
         let (points, low) = line([0.4, 0.3, 0.2, 0.1], [0.1, 0.2, 0.3, 0.4]);
         let (_, high) = line([0.0, 0.9, 0.1, 0.0], [0.0, 0.0, 0.1, 0.9]);
-        let rules = Peaks { radius: 1e-6, distance: 0.01, widest: 1.0 };
+        let rules = PeakRules { radius: 1e-6, distance: 0.01, span: [0.0, 1.0] };
         let maps = [low.clone(), high.clone(), low];
         assert_eq!(pairs(Sampler::VmaoPeak, &maps, &points, rules, 9, &stream), [[0, 3], [1, 3], [0, 3]]);
         assert_eq!(pairs(Sampler::VmaoRanked, &maps, &points, rules, 9, &stream), [[1, 3], [0, 3]]);
