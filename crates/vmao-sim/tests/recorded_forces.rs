@@ -30,7 +30,9 @@ fn at_the_goal_the_hands_carry_the_weight_and_squeeze() {
     assert!((carried - Vector3::z() * weight).norm() < 0.05 * weight, "{carried:?} N, expected {weight} N upward");
     for pad in held.iter().flatten().flatten() {
         assert!(Vector3::from(pad.force).norm() > config.grasp.hold_force, "a hand that holds presses: {pad:?}");
-        let near = rollout.frames[rollout.frames.len() - 1].iter().map(|pose| (pose.translation.vector - Vector3::from(pad.point)).norm());
+        let near = rollout.frames[rollout.frames.len() - 1]
+            .iter()
+            .map(|pose| (pose.translation.vector - Vector3::from(pad.point)).norm());
         assert!(near.fold(f64::INFINITY, f64::min) < 0.2, "a contact lies near some body: {pad:?}");
     }
 }

@@ -35,7 +35,10 @@ fn a_full_report_is_written_for_looking_at() {
     // What the page carries is the motion that was given, to the stated precision.
     let packed: PackedRollout = serde_json::from_value(shown["rollout"].clone()).unwrap();
     let back = packed.unpack().unwrap();
-    assert_eq!((back.bodies.len(), back.frames.len(), back.forces.len()), (made.bodies.len(), made.frames.len(), made.frames.len()));
+    assert_eq!(
+        (back.bodies.len(), back.frames.len(), back.forces.len()),
+        (made.bodies.len(), made.frames.len(), made.frames.len())
+    );
     for (made, back) in made.frames.iter().flatten().zip(back.frames.iter().flatten()) {
         assert!((made.translation.vector - back.translation.vector).amax() <= 0.5e-4 + 1e-9);
         assert!(rotation_distance(&made.rotation, &back.rotation) < 2e-4);

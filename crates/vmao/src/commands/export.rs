@@ -96,7 +96,9 @@ pub(super) fn run(arguments: &ExportArguments, session: &Session) -> Result<(), 
     };
     let frames = animation.frames(&rollout).len();
     if frames * animation.size[0] * animation.size[1] > MOST_PIXELS {
-        let message = format!("{frames} pictures of {width} pixels across: too large, expected a smaller --width or --rate, or more --speed");
+        let message = format!(
+            "{frames} pictures of {width} pixels across: too large, expected a smaller --width or --rate, or more --speed"
+        );
         return Err(Failure::bad_input(message));
     }
     let default = run.join(format!("trial-{}-{}-{}.gif", line.order.name(), line.method.name(), line.index));
@@ -142,7 +144,10 @@ fn chosen<'l>(arguments: &ExportArguments, lines: &'l [TrialLine]) -> Result<&'l
 pub(super) fn motion(run: &Path, line: &TrialLine) -> Result<Rollout, Failure> {
     let stored = StoredRollouts::of(run);
     if let Some(packed) = stored.read(line)? {
-        return packed.unpack().map_err(|problem| Failure::bad_input(format!("{}: {problem}", stored.path(line).display()))).and_then(playable);
+        return packed
+            .unpack()
+            .map_err(|problem| Failure::bad_input(format!("{}: {problem}", stored.path(line).display())))
+            .and_then(playable);
     }
     let config = Config::load(Some(&run.join("config.toml")), &[]).or_bad_input()?;
     let info = RunInfo::load(run).or_bad_input()?;
@@ -158,7 +163,11 @@ pub(super) fn motion(run: &Path, line: &TrialLine) -> Result<Rollout, Failure> {
         };
         let (then, now) = (named(line.outcome), named(again.record.outcome));
         let place = run.join("trials.jsonl");
-        return Err(Failure::Work(anyhow::anyhow!("{}: trial {} ended with {then} and now with {now}", place.display(), line.index)));
+        return Err(Failure::Work(anyhow::anyhow!(
+            "{}: trial {} ended with {then} and now with {now}",
+            place.display(),
+            line.index
+        )));
     }
     playable(again.rollout.unwrap_or_default())
 }

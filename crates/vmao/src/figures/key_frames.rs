@@ -1,6 +1,6 @@
 //! Figure 3: a manipulation in key frames, seen from the front and from the side.
 
-use crate::picture::{Layer, Studio, sheet};
+use crate::picture::{Framing, Layer, Studio, sheet};
 use rayon::prelude::*;
 use std::f64::consts::FRAC_PI_2;
 use vmao_core::rollout::Rollout;
@@ -8,7 +8,8 @@ use vmao_sim::Picture;
 
 /// Of one key frame (pixels).
 const TILE: [usize; 2] = [240, 180];
-const ELEVATION: f64 = 0.28;
+/// Turn and elevation of the front and of the side view (rad); from the side over the arm that stands there.
+const VIEWS: [[f64; 2]; 2] = [[0.0, 0.3], [FRAC_PI_2, 0.75]];
 
 /// When something has come about: the start, each hold, each place that the object was brought to, the end (s).
 fn key_times(rollout: &Rollout) -> Vec<f64> {
@@ -27,9 +28,9 @@ pub(crate) fn key_frames(rollout: &Rollout) -> Picture {
     let studio = Studio::new(rollout);
     let frame = |time: &f64| ((time / rollout.frame_seconds).round() as usize).min(rollout.frames.len() - 1);
     let frames: Vec<usize> = key_times(rollout).iter().map(frame).collect();
-    let row = |turn: f64| {
-        let eye = studio.eye(turn, ELEVATION, TILE[0] as f64 / TILE[1] as f64);
+    let row = |view: [f64; 2]| {
+        let eye = studio.eye(view, TILE[0] as f64 / TILE[1] as f64, Framing::Work);
         frames.par_iter().map(|&frame| studio.picture(frame, &eye, TILE, Layer::Plain)).collect()
     };
-    sheet(&[row(0.0), row(FRAC_PI_2)])
+    sheet(&VIEWS.map(row))
 }

@@ -6,7 +6,7 @@ use crate::failure::Failure;
 use crate::learned_contacts::LearnedContacts;
 use crate::picture::{Cloud, eye_of, sheet};
 use crate::report::LatentMap;
-use crate::results::{Method, aligned};
+use crate::results::{Method, aligned, wilson95};
 use crate::scoring::{Estimate, mean_of};
 use nalgebra::{Point3, Vector3};
 use rayon::prelude::*;
@@ -57,6 +57,9 @@ const MEASURES: [(&str, &str); 7] = [
     ("from-the-side", "executed grasps from more than 45° off the vertical"),
     ("approach-angle", "angle of executed approaches to the vertical, degrees"),
 ];
+
+/// The measure that is a yes or a no of each scene.
+const COUNTED: &str = "from-the-side";
 
 /// A measure before and after lifting, with 95 % intervals over scenes.
 #[derive(Debug, Serialize)]
@@ -147,7 +150,13 @@ impl Surfaces {
         let mut mass = [0.0; 3];
         for (up, (first, second)) in self.up.iter().zip(map.finger1.iter().zip(&map.finger2)) {
             let Some(up) = up else { continue };
-            let side = if *up > FRAC_1_SQRT_2 { 0 } else if *up < -FRAC_1_SQRT_2 { 2 } else { 1 };
+            let side = if *up > FRAC_1_SQRT_2 {
+                0
+            } else if *up < -FRAC_1_SQRT_2 {
+                2
+            } else {
+                1
+            };
             mass[side] += f64::from(first + second);
         }
         let all: f64 = mass.iter().sum();
@@ -155,7 +164,12 @@ impl Surfaces {
     }
 }
 
-fn measures(seen: &Observation, maps: &[LatentMap], surfaces: &Surfaces, grasp: Option<&GraspRecord>) -> [Option<f64>; MEASURES.len()] {
+fn measures(
+    seen: &Observation,
+    maps: &[LatentMap],
+    surfaces: &Surfaces,
+    grasp: Option<&GraspRecord>,
+) -> [Option<f64>; MEASURES.len()] {
     let mean = |values: Vec<f64>| (!values.is_empty()).then(|| values.iter().sum::<f64>() / values.len() as f64);
     let mass = |side: usize| mean(maps.iter().filter_map(|map| surfaces.shares(map)).map(|shares| shares[side]).collect());
     let height = |map: &LatentMap| {
@@ -165,7 +179,8 @@ fn measures(seen: &Observation, maps: &[LatentMap], surfaces: &Surfaces, grasp: 
     let heights: Vec<f64> = maps.iter().filter_map(height).collect();
     let steep = heights.iter().map(|height| f64::from(u8::from(*height > FRAC_1_SQRT_2))).collect();
     // The tool's z is the approach; straight down is zero.
-    let approach = |grasp: &GraspRecord| grasp.world_from_gripper.map(|tool| (-(tool.rotation * Vector3::z()).z).clamp(-1.0, 1.0).acos());
+    let approach =
+        |grasp: &GraspRecord| grasp.world_from_gripper.map(|tool| (-(tool.rotation * Vector3::z()).z).clamp(-1.0, 1.0).acos());
     let angle = grasp.and_then(approach).map(f64::to_degrees);
     let from_the_side = angle.map(|angle| f64::from(u8::from(angle > 45.0)));
     [mass(0), mass(1), mass(2), mean(steep), mean(heights), from_the_side, angle]
@@ -175,12 +190,22 @@ fn measures(seen: &Observation, maps: &[LatentMap], surfaces: &Surfaces, grasp: 
 pub(crate) fn changes(scenes: &[LiftedScene], seed: u64) -> Vec<Change> {
     let change = |(measure, &(name, words)): (usize, &(&'static str, &'static str))| {
         let of = |state: usize| scenes.iter().map(move |scene| scene.states[state].measures[measure]);
-        let estimate = |values: Vec<Option<f64>>| mean_of(&values, RESAMPLES, seed);
-        let both = of(0).zip(of(1)).map(|(before, after)| Some(after? - before?)).collect();
-        let (before, after, difference) = (estimate(of(0).collect()), estimate(of(1).collect()), estimate(both));
+        let estimate = |values: Vec<Option<f64>>| {
+            let found = mean_of(&values, RESAMPLES, seed)?;
+            Some(if name == COUNTED { Estimate { interval95: counted(&values), ..found } } else { found })
+        };
+        let both: Vec<Option<f64>> = of(0).zip(of(1)).map(|(before, after)| Some(after? - before?)).collect();
+        let difference = mean_of(&both, RESAMPLES, seed);
+        let (before, after) = (estimate(of(0).collect()), estimate(of(1).collect()));
         Change { name, measure: words, before, after, difference }
     };
     MEASURES.iter().enumerate().map(change).collect()
+}
+
+/// Wilson's interval where every scene is a yes, 1, or a no: drawing scenes again says nothing of what never happened.
+fn counted(values: &[Option<f64>]) -> [f64; 2] {
+    let known = || values.iter().flatten();
+    wilson95(known().filter(|value| **value > 0.5).count() as u64, known().count() as u64)
 }
 
 /// The changes for people.
@@ -237,10 +262,18 @@ mod tests {
         // Upside down, what faced up faces down.
         let over = Pose::rotation(Vector3::x() * std::f64::consts::PI);
         let mut turned = seen.clone();
-        turned.points = seen.points.iter().map(|point| (over * Point3::from(*point).map(f64::from)).map(|x| x as f32).into()).collect();
+        turned.points =
+            seen.points.iter().map(|point| (over * Point3::from(*point).map(f64::from)).map(|x| x as f32).into()).collect();
         let turned = Surfaces::new(&turned, 0, &solids, &over).shares(&map).unwrap();
         assert!((turned[2] - shares[0]).abs() < 1e-6 && (turned[1] - shares[1]).abs() < 1e-6);
         assert!(Surfaces::new(&seen, 1, &solids, &Pose::identity()).shares(&map).is_none(), "no mass on a part that is not seen");
+    }
+
+    #[test]
+    fn what_never_happened_has_wilsons_interval() {
+        assert_eq!(counted(&[Some(0.0), None, Some(0.0)]), wilson95(0, 2));
+        assert_eq!(counted(&[Some(0.0), Some(1.0), None]), wilson95(1, 2));
+        assert!(MEASURES.iter().any(|(name, _)| *name == COUNTED));
     }
 
     #[test]

@@ -1,7 +1,7 @@
 //! A rollout as an animated GIF: one palette for all frames, and of each frame only what changed.
 
 use super::palette::Palette;
-use super::studio::{Layer, Studio};
+use super::studio::{Framing, Layer, Studio};
 use crate::failure::Failure;
 use gif::{DisposalMethod, Encoder, Frame, Repeat};
 use rayon::prelude::*;
@@ -52,10 +52,15 @@ impl Animation {
 }
 
 /// Draws in the current rayon pool and writes; `drawn` is called after each picture. The rollout must have a frame.
-pub(crate) fn encode(rollout: &Rollout, animation: &Animation, out: impl Write, drawn: &(dyn Fn() + Sync)) -> Result<(), Failure> {
+pub(crate) fn encode(
+    rollout: &Rollout,
+    animation: &Animation,
+    out: impl Write,
+    drawn: &(dyn Fn() + Sync),
+) -> Result<(), Failure> {
     let studio = Studio::new(rollout);
     let [width, height] = animation.size;
-    let eye = studio.eye(animation.turn, animation.elevation, width as f64 / height as f64);
+    let eye = studio.eye([animation.turn, animation.elevation], width as f64 / height as f64, Framing::Whole);
     let frames = animation.frames(rollout);
     let last = rollout.frames.len() - 1;
     let draw = |&frame: &usize| {
@@ -65,7 +70,8 @@ pub(crate) fn encode(rollout: &Rollout, animation: &Animation, out: impl Write, 
         picture
     };
     let pictures: Vec<Picture> = frames.par_iter().map(draw).collect();
-    let palette = Palette::of(pictures.iter().step_by((pictures.len() / SAMPLED).max(1)).chain(pictures.last()), usize::from(UNCHANGED));
+    let palette =
+        Palette::of(pictures.iter().step_by((pictures.len() / SAMPLED).max(1)).chain(pictures.last()), usize::from(UNCHANGED));
     // A whole table, so that the index of what did not change is in it.
     let mut table = palette.colors.clone();
     table.resize(usize::from(UNCHANGED) + 1, [0; 3]);
@@ -115,6 +121,12 @@ fn bar(picture: &mut Picture, share: f64, success: bool) {
     let [future, good, bad] = BAR_COLORS;
     let top = picture.height.saturating_sub(BAR) * width;
     for (at, pixel) in picture.pixels[top..].iter_mut().enumerate() {
-        *pixel = if at % width >= done { future } else if success { good } else { bad };
+        *pixel = if at % width >= done {
+            future
+        } else if success {
+            good
+        } else {
+            bad
+        };
     }
 }

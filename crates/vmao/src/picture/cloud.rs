@@ -10,7 +10,7 @@ const RAYS: usize = 3;
 const FIELD: f64 = 0.5;
 /// Radius of a point (m); of a mark, in points.
 const RADIUS: f64 = 0.0036;
-const MARK: f64 = 2.2;
+const MARK: f64 = 1.7;
 /// The curve that lifts a map's faint tail.
 const GAMMA: f64 = 0.75;
 const PAPER: Vector3<f64> = Vector3::new(0.985, 0.983, 0.976);
@@ -142,7 +142,7 @@ mod tests {
             assert!(!found.is_empty());
             found.iter().map(|at| at % picture.width).sum::<usize>() / found.len()
         };
-        let green = middle(|[r, g, b]| g > &(r + 60) && g > &(b + 40));
+        let green = middle(|[r, g, b]| g > &r.saturating_add(60) && g > &b.saturating_add(40));
         let blue = middle(|[r, _, b]| b > &(r.saturating_add(100)));
         assert!((20..45).contains(&green) && (155..180).contains(&blue), "{green} {blue}");
         let plain = Cloud { seen: &seen, eye, size: [200, 100] }.picture(None);

@@ -93,7 +93,8 @@ mod tests {
 
     #[test]
     fn up_is_up_and_the_first_column_is_on_the_right() {
-        let eye = Eye { target: Point3::origin(), distance: 1.0, azimuth: -std::f64::consts::FRAC_PI_2, elevation: 0.3, field: 0.5 };
+        let eye =
+            Eye { target: Point3::origin(), distance: 1.0, azimuth: -std::f64::consts::FRAC_PI_2, elevation: 0.3, field: 0.5 };
         let camera = eye.pinhole(9, 9);
         let seen = camera.world_from_camera.inverse_transform_point(&Point3::new(0.1, 0.0, 0.1));
         // From −y, +x is on the right: a column of negative X.

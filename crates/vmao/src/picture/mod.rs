@@ -10,4 +10,4 @@ mod studio;
 pub(crate) use animation::{Animation, encode};
 pub(crate) use cloud::{Cloud, eye_of};
 pub(crate) use png::{save, sheet};
-pub(crate) use studio::{Layer, Studio};
+pub(crate) use studio::{Framing, Layer, Studio};

@@ -3,7 +3,7 @@
 use vmao_sim::Picture;
 
 /// Bits of each component that colours are told apart by.
-const BITS: u32 = 5;
+const BITS: u32 = 6;
 const BINS: usize = 1 << (3 * BITS);
 
 /// Colours, and which of them stands for each coarse colour.
@@ -45,7 +45,8 @@ impl Palette {
         let used: Vec<Bin> = bins.into_iter().filter(|bin| bin.count > 0).collect();
         let mut boxes = vec![used];
         while boxes.len() < most {
-            let Some((at, axis, _)) = boxes.iter().enumerate().filter_map(|(at, inside)| widest(at, inside)).max_by(|a, b| a.2.total_cmp(&b.2))
+            let Some((at, axis, _)) =
+                boxes.iter().enumerate().filter_map(|(at, inside)| widest(at, inside)).max_by(|a, b| a.2.total_cmp(&b.2))
             else {
                 break;
             };
@@ -93,7 +94,7 @@ fn widest(at: usize, inside: &[Bin]) -> Option<(usize, usize, f64)> {
     };
     let axis = (0..3).max_by(|a, b| spread(*a).total_cmp(&spread(*b)))?;
     // Large areas count, but not so much that small bright things lose their colour.
-    Some((at, axis, spread(axis) * (count as f64).powf(0.25)))
+    Some((at, axis, spread(axis) * (count as f64).powf(0.4)))
 }
 
 fn nearest(colors: &[[u8; 3]], bin: usize) -> u8 {

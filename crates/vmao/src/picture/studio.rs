@@ -34,6 +34,8 @@ const CELL: f64 = 0.006;
 const DOT: f64 = 0.0024;
 const CONTACT_RADIUS: f64 = 0.007;
 const METRES_PER_NEWTON: f64 = 0.004;
+/// Room for hands about the parts (m).
+const WORK_ROOM: f64 = 0.16;
 const TABLE_NUMBER: u32 = u32::MAX - 1;
 
 /// What is drawn besides bodies and goal.
@@ -45,6 +47,15 @@ pub(crate) enum Layer {
     Plain,
 }
 
+/// How much is to be seen.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Framing {
+    /// Arms and object.
+    Whole,
+    /// The object's way and the hands about it.
+    Work,
+}
+
 /// A rollout set up for pictures.
 #[derive(Debug)]
 pub(crate) struct Studio<'r> {
@@ -52,7 +63,9 @@ pub(crate) struct Studio<'r> {
     goal_points: Vec<Point3<f64>>,
     /// The direction from which the arms stand side by side (rad).
     front: f64,
-    balls: Vec<(Point3<f64>, f64)>,
+    /// What a picture of everything must hold, and one of the work: places and room about them (m).
+    whole: Vec<(Point3<f64>, f64)>,
+    work: Vec<(Point3<f64>, f64)>,
 }
 
 /// A solid where it is.
@@ -71,14 +84,20 @@ impl<'r> Studio<'r> {
             .flat_map(|(body, pose)| body.solids.iter().map(move |solid| (solid, pose * solid.carrier_from_solid)))
             .collect();
         let goal_points = surface(&goal);
-        let balls = balls(rollout, &goal_points);
-        let front = front(rollout, &balls);
-        Self { rollout, goal_points, front, balls }
+        let whole = balls(rollout, &goal_points, &|label| match label {
+            PointLabel::Table => None,
+            PointLabel::Arm(_) => Some(0.07),
+            PointLabel::Part(_) => Some(0.05),
+        });
+        let work = balls(rollout, &goal_points, &|label| matches!(label, PointLabel::Part(_)).then_some(WORK_ROOM));
+        let front = front(rollout, &whole);
+        Self { rollout, goal_points, front, whole, work }
     }
 
-    /// An eye for all frames, turned from the front by `turn` (rad).
-    pub(crate) fn eye(&self, turn: f64, elevation: f64, aspect: f64) -> Eye {
-        fit(&self.balls, [self.front + turn, elevation], FIELD, aspect)
+    /// An eye for all frames, turned from the front by `turn` and above the level by `elevation` (rad).
+    pub(crate) fn eye(&self, [turn, elevation]: [f64; 2], aspect: f64, framing: Framing) -> Eye {
+        let balls = if framing == Framing::Whole { &self.whole } else { &self.work };
+        fit(balls, [self.front + turn, elevation], FIELD, aspect)
     }
 
     /// The picture of a frame.
@@ -125,7 +144,10 @@ impl<'r> Studio<'r> {
             for (finger, color) in contact.fingers.iter().zip(FINGERS) {
                 let at = now_from_then * Point3::from(*finger);
                 let ball = Shape::Sphere { radius: CONTACT_RADIUS };
-                marks.push((Solid { shape: ball, carrier_from_solid: Pose::identity(), color }, Pose::translation(at.x, at.y, at.z)));
+                marks.push((
+                    Solid { shape: ball, carrier_from_solid: Pose::identity(), color },
+                    Pose::translation(at.x, at.y, at.z),
+                ));
             }
         }
         let pads = rollout.forces.get(frame).into_iter().flatten().flatten();
@@ -226,7 +248,9 @@ impl Shadows {
     fn lit(&self, point: &Point3<f64>) -> bool {
         let seen = self.light.world_from_camera.inverse_transform_point(point);
         let pixel = |x: f64, count: usize| (count as f64 * (x / self.light.half_tangent + 1.0) / 2.0) as usize;
-        let inside = seen.z > 0.0 && (seen.x / seen.z).abs() < self.light.half_tangent && (seen.y / seen.z).abs() < self.light.half_tangent;
+        let inside = seen.z > 0.0
+            && (seen.x / seen.z).abs() < self.light.half_tangent
+            && (seen.y / seen.z).abs() < self.light.half_tangent;
         if !inside {
             return true;
         }
@@ -266,7 +290,8 @@ pub(super) fn average(colors: &[Vector3<f64>], [width, height]: [usize; 2], rays
 /// Points on these solids' outer surface, one a cell: what cameras all around see.
 fn surface(solids: &[(&Solid, Pose)]) -> Vec<Point3<f64>> {
     let reach = |(solid, pose): &(&Solid, Pose)| {
-        let extent = [Vector3::x(), Vector3::y(), Vector3::z()].map(|axis| solid.shape.extent_along(&axis).max(solid.shape.extent_along(&-axis)));
+        let extent = [Vector3::x(), Vector3::y(), Vector3::z()]
+            .map(|axis| solid.shape.extent_along(&axis).max(solid.shape.extent_along(&-axis)));
         (Point3::from(pose.translation.vector), Vector3::from(extent).norm())
     };
     let balls: Vec<(Point3<f64>, f64)> = solids.iter().map(reach).collect();
@@ -293,21 +318,12 @@ fn surface(solids: &[(&Solid, Pose)]) -> Vec<Point3<f64>> {
     points
 }
 
-/// What a picture of all frames must hold: the ways of the parts and hands, the goal, and room about them.
-fn balls(rollout: &Rollout, goal: &[Point3<f64>]) -> Vec<(Point3<f64>, f64)> {
+/// The ways of the bodies that have room, each with its own (m), and the goal.
+fn balls(rollout: &Rollout, goal: &[Point3<f64>], room: &dyn Fn(PointLabel) -> Option<f64>) -> Vec<(Point3<f64>, f64)> {
     let mut balls: Vec<(Point3<f64>, f64)> = goal.iter().step_by(20).map(|point| (*point, 0.02)).collect();
     let frames = rollout.frames.iter().step_by((rollout.frames.len() / 24).max(1)).chain(rollout.frames.last());
-    for frame in frames {
-        for (body, pose) in rollout.bodies.iter().zip(frame) {
-            let (room, shown) = match body.label {
-                PointLabel::Table => (0.0, false),
-                PointLabel::Arm(_) => (0.07, true),
-                PointLabel::Part(_) => (0.05, true),
-            };
-            if shown {
-                balls.push((pose.translation.vector.into(), room));
-            }
-        }
+    for (body, pose) in frames.flat_map(|frame| rollout.bodies.iter().zip(frame)) {
+        balls.extend(room(body.label).map(|room| (pose.translation.vector.into(), room)));
     }
     // A motion of nothing is still a picture.
     if balls.is_empty() { vec![(Point3::origin(), 0.5)] } else { balls }

@@ -25,7 +25,7 @@ mod tests {
     fn every_failure_class_is_explained_in_words() {
         for stage in FailureStage::ALL {
             for text in explanation(stage) {
-                assert!(text.len() > 80 && text.ends_with('.') && !text.contains("](" ), "{}: {text:?}", stage.name());
+                assert!(text.len() > 80 && text.ends_with('.') && !text.contains("]("), "{}: {text:?}", stage.name());
             }
         }
     }

@@ -9,8 +9,8 @@ mod pack;
 mod page;
 
 pub use data::{
-    Cell, ContactMapFigure, ExplorationRound, ExplorationSummary, FailureClass, LatentMap, Provenance, ReportData,
-    RolloutFigure, ThresholdPoint, TrainingCurve, TrainingEpoch, TrialPlace,
+    Cell, ContactMapFigure, ExplorationRound, ExplorationSummary, FailureClass, LatentMap, Provenance, ReportData, RolloutFigure,
+    ThresholdPoint, TrainingCurve, TrainingEpoch, TrialPlace,
 };
 pub(crate) use failure_classes::explanation;
 pub use page::render;

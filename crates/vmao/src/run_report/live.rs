@@ -46,7 +46,8 @@ pub(super) fn scenes(evaluation: &Evaluation<'_>, lines: &[TrialLine], seed: u64
     let solved = |order, index| of_order(order).any(|line| line.index == index && line.outcome.is_success());
     let everywhere = |line: &&TrialLine| orders.iter().all(|&order| solved(order, line.index));
     let indices: Vec<u64> = of_order(first).filter(everywhere).take(SCENES).map(|line| line.index).collect();
-    let wanted: Vec<(u64, GraspOrder)> = indices.iter().flat_map(|&index| orders.iter().map(move |&order| (index, order))).collect();
+    let wanted: Vec<(u64, GraspOrder)> =
+        indices.iter().flat_map(|&index| orders.iter().map(move |&order| (index, order))).collect();
     let bar = progress_bar("codes for the report", wanted.len() as u64 * CODES);
     let figures = wanted.par_iter().map(|&(index, order)| {
         let figure = scene(evaluation, model, (order, index), seed)?;

@@ -56,7 +56,9 @@ fn note(shown: usize, all: usize) -> String {
     if shown == all {
         return format!("All {all} trials of the table can be played.");
     }
-    format!("{shown} of the table's {all} trials can be played here: examples of every failure class first, then successes of every row, spread evenly.")
+    format!(
+        "{shown} of the table's {all} trials can be played here: examples of every failure class first, then successes of every row, spread evenly."
+    )
 }
 
 fn figure(line: &TrialLine, rollout: PackedRollout) -> RolloutFigure {

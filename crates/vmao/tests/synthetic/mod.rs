@@ -5,8 +5,8 @@ pub(crate) mod motion;
 use nalgebra::{Point3, Vector3};
 use std::collections::BTreeMap;
 use vmao::report::{
-    Cell, ContactMapFigure, ExplorationRound, ExplorationSummary, FailureClass, LatentMap, Provenance, ReportData,
-    RolloutFigure, ThresholdPoint, TrainingCurve, TrainingEpoch, TrialPlace,
+    Cell, ContactMapFigure, ExplorationRound, ExplorationSummary, FailureClass, LatentMap, Provenance, ReportData, RolloutFigure,
+    ThresholdPoint, TrainingCurve, TrainingEpoch, TrialPlace,
 };
 use vmao::results::GoalCounts;
 use vmao::rollouts::PackedRollout;
