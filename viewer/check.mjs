@@ -93,9 +93,14 @@ try {
     check("a code can be chosen", await page.locator(".map").nth(1).evaluate((node) => node.classList.contains("chosen")));
   }
 
+  const loaded = (player) => player.locator("canvas").evaluate(async (node) => {
+    for (let tries = 0; tries < 200 && !node.dataset.loaded; tries++) await new Promise((done) => setTimeout(done, 50));
+    return node.dataset.loaded ?? "";
+  });
   const players = page.locator(".player");
   for (let i = 0; i < await players.count(); i++) {
     const player = players.nth(i);
+    await loaded(player);
     const slider = player.locator("input[type=range]");
     const time = async () => Number(await slider.inputValue());
     const end = Number(await slider.getAttribute("max"));
@@ -105,17 +110,38 @@ try {
     const painted = () => player.locator("canvas").evaluate((node) => Number(node.dataset.painted));
     const drawn = await painted();
     await page.keyboard.press(" ");
-    await page.waitForTimeout(1500);
+    // Frames that the browser offers and pictures drawn in the same time; told, not judged: the machine decides.
+    const offered = await page.evaluate(() => new Promise((done) => {
+      let frames = 0;
+      const began = performance.now();
+      const next = (now) => { frames += 1; if (now - began < 1500) requestAnimationFrame(next); else done((1000 * frames) / (now - began)); };
+      requestAnimationFrame(next);
+    }));
     const later = await time();
     await page.keyboard.press(" ");
     await page.waitForTimeout(200);
     const paused = await time();
     await page.waitForTimeout(400);
-    check(`player ${i + 1}: space plays`, later > start, `${start.toFixed(2)} → ${later.toFixed(2)} s, ${((await painted() - drawn) / 1.5).toFixed(0)} pictures/s`);
+    check(`player ${i + 1}: space plays`, later > start, `${start.toFixed(2)} → ${later.toFixed(2)} s, ${((await painted() - drawn) / 1.5).toFixed(0)} pictures/s of ${offered.toFixed(0)} frames/s`);
     check(`player ${i + 1}: space pauses`, await time() === paused);
     await slider.evaluate((node, value) => { node.value = value; node.dispatchEvent(new Event("input", { bubbles: true })); }, String(end * 0.62));
     await page.waitForTimeout(600);
     check(`player ${i + 1}: the slider seeks`, Math.abs(await time() - end * 0.62) < 0.05 && (await player.locator(".clock").textContent()).startsWith((end * 0.62).toFixed(2)));
+    await player.locator("canvas").focus();
+    const frame = await time();
+    await page.keyboard.press(".");
+    const next = await time();
+    await page.keyboard.press(",");
+    check(`player ${i + 1}: full stop and comma step a frame`, next > frame && Math.abs(await time() - frame) < 1e-6, `${(1000 * (next - frame)).toFixed(0)} ms`);
+    const forces = await player.locator(".forces").textContent();
+    check(`player ${i + 1}: forces are told in newtons or said to be missing`, /press [\d.]+ and [\d.]+\u2009N|without forces/.test(forces), forces.slice(0, 80));
+    await page.keyboard.press("f");
+    check(`player ${i + 1}: F hides the forces`, !(await player.locator('[data-layer=forces]').isChecked()) || /without/.test(forces));
+    await page.keyboard.press("f");
+    await page.keyboard.press("Home");
+    check(`player ${i + 1}: Home is the start`, await time() === 0);
+    await page.keyboard.press("End");
+    check(`player ${i + 1}: End is the end`, Math.abs(await time() - end) < 1e-6);
     for (const camera of ["Front", "Side", "Top", "Close", "Reset"]) {
       await player.getByRole("button", { name: camera, exact: true }).click();
       await page.waitForTimeout(1200);
@@ -135,6 +161,54 @@ try {
       await player.screenshot({ path: join(shots, `player-${i + 1}-${name}.png`) });
     }
     await slider.evaluate((node, value) => { node.value = value; node.dispatchEvent(new Event("input", { bubbles: true })); }, String(end * 0.5));
+  }
+
+  const trials = page.locator("select.trials");
+  if (await trials.count()) {
+    const player = page.locator("#rollouts .player");
+    const many = await trials.locator("option").count();
+    const before = await loaded(player);
+    await player.locator("canvas").focus();
+    await page.keyboard.press("]");
+    await page.waitForTimeout(1500);
+    check("] plays the next trial", await loaded(player) !== before && await trials.evaluate((node) => node.selectedIndex) === 1 % many, `${many} trials`);
+    // Every trial of the page must come through unpacking and building without a word.
+    let [broken, began] = [0, Date.now()];
+    for (let k = 0; k < many; k++) {
+      const last = await loaded(player);
+      await trials.selectOption({ index: k });
+      const good = await player.locator("canvas").evaluate(async (node, last) => {
+        for (let tries = 0; tries < 400 && node.dataset.loaded === last; tries++) await new Promise((done) => setTimeout(done, 10));
+        return node.dataset.loaded !== last;
+      }, last);
+      if (!good) broken += 1;
+    }
+    check("every trial loads", broken === 0, `${many} in ${((Date.now() - began) / 1000).toFixed(1)} s`);
+  }
+  const examples = page.locator("button.example");
+  for (let i = 0; i < await examples.count(); i++) {
+    await examples.nth(i).click();
+    await page.waitForTimeout(1200);
+    const badge = await page.locator("#rollouts .player-head .badge").textContent();
+    const heading = (await page.locator(".failure h4").nth(i).textContent()).split(/ \d/)[0].trim();
+    check(`the example of "${heading}" is one`, badge === `Failed: ${heading}`, badge);
+  }
+  const classes = await page.locator(".failure").count();
+  check("every failure class has an example", classes === await examples.count(), `${classes} classes`);
+  const scenes = page.locator("#contact-maps select[aria-label=Scene]");
+  if (await scenes.count()) {
+    const codes = page.locator("#contact-maps .map .code");
+    const live = page.locator("#contact-maps .player");
+    if (await live.count()) {
+      const before = await loaded(live);
+      await codes.nth(2).click();
+      await page.waitForTimeout(1500);
+      check("a code plays what it leads to", await loaded(live) !== before && (await page.locator("#contact-maps .player-head h3").textContent()).startsWith("Code 3"));
+    }
+    const title = await page.locator("#contact-maps figure h3").first().textContent();
+    await scenes.selectOption({ index: 1 });
+    await page.waitForTimeout(1500);
+    check("another scene can be picked", await page.locator("#contact-maps figure h3").first().textContent() !== title);
   }
 
   const chart = page.locator(".chart svg").first();

@@ -18,7 +18,7 @@ function main() {
   const sections = [
     ["results", "Results", () => resultsSection(data.cells ?? [])],
     ["contact-maps", "Contact maps", () => mapsSection(data.contact_maps ?? [], stage)],
-    ["rollouts", "Rollouts", () => rolloutsSection(data.rollouts ?? [], stage)],
+    ["rollouts", "Rollouts", () => rolloutsSection(data, stage)],
     ["training", "Training", () => trainingSection(data.training ?? [])],
     ["exploration", "Exploration", () => explorationSection(data.exploration)],
     ["configuration", "Configuration", () => configurationSection(data.provenance ?? {})],

@@ -7,14 +7,27 @@ import { isNumber, sentences } from "./format.js";
 import { blend, cloudBase, cloudFrame, mapScene } from "./cloud.js";
 import { Orbit } from "./orbit.js";
 import { FINGERS } from "./palette.js";
+import { KEYS as PLAYER_KEYS, Player } from "./player.js";
 import { NO_WEBGL } from "./stage.js";
 
 const FIELD = 30;
 const GREY = [0.82, 0.82, 0.8];
 
-/** The contact-map section's content; nothing without maps. */
+/** The contact-map section's content, one scene at a time; nothing without maps. */
 export function mapsSection(figures, stage) {
-  return figures.filter((entry) => entry.maps?.length).map((entry) => mapsFigure(entry, numberOf("Figure"), stage));
+  const scenes = figures.filter((entry) => entry.maps?.length);
+  if (!scenes.length) return [];
+  const name = numberOf("Figure");
+  const made = new Map();
+  const place = el("div", {});
+  // A scene's views are made when it is first chosen.
+  const choose = (at) => {
+    if (!made.has(at)) made.set(at, mapsFigure(scenes[at], name, stage));
+    place.replaceChildren(made.get(at));
+  };
+  const select = el("select", { "aria-label": "Scene", onchange: () => choose(select.selectedIndex) }, scenes.map(({ title }, i) => el("option", {}, title || `Scene ${i + 1}`)));
+  choose(0);
+  return [scenes.length > 1 && el("div", { class: "controls chooser" }, el("label", {}, "Scene ", select)), place].filter(Boolean);
 }
 
 const caption = (entry) => `${sentences(entry.caption)}Contact maps of one scene for ${entry.maps.length} latent codes: finger 1 in green, ` +
@@ -64,6 +77,7 @@ function mapsFigure(entry, name, stage) {
     return { node: el("div", { class: "map" }, canvas, button), button };
   });
   view(large, () => maps[chosen]);
+  const player = entry.maps.some(({ executed }) => executed) ? new Player(stage, (step) => choose((chosen + step + maps.length) % maps.length)) : null;
 
   function choose(i) {
     chosen = i;
@@ -73,6 +87,7 @@ function mapsFigure(entry, name, stage) {
     });
     facts.replaceChildren(...mapFacts(maps[i], codeName(i)));
     views.at(-1).invalidate();
+    if (player && entry.maps[i].executed) player.show(entry.maps[i].executed);
   }
   choose(0);
 
@@ -85,7 +100,8 @@ function mapsFigure(entry, name, stage) {
       el("button", { type: "button", onclick: () => orbit.reset() }, "Reset view")),
     el("p", { class: "hint" }, "Drag to turn, shift-drag to move, scroll to zoom once focused, arrow keys to turn, + and − to zoom, 0 to reset."));
   return figure(name, caption(entry), title, el("div", { class: "five", style: { "--views": String(Math.min(5, maps.length)) } }, panels.map(({ node }) => node)),
-    el("div", { class: "focus" }, el("div", { class: "large" }, large), aside));
+    el("div", { class: "focus" }, el("div", { class: "large" }, large), aside),
+    player && el("div", { class: "executed" }, player.node, el("p", { class: "hint keys" }, `Keys: ${PLAYER_KEYS}`)));
 }
 
 const KEYS = "Arrow keys turn, plus and minus zoom, 0 resets.";

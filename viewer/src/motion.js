@@ -1,7 +1,6 @@
 // A rollout's poses over time, and where things are between two recorded frames.
 
 import { Quaternion, Vector3 } from "three";
-import { unpackFloats } from "./data.js";
 
 const STRIDE = 7; // x, y, z (m), then the quaternion w, x, y, z
 const before = new Quaternion();
@@ -18,13 +17,16 @@ export function readPose(values, at, position, quaternion) {
 export class Motion {
   constructor(rollout) {
     this.bodies = rollout.bodies.length;
-    this.poses = unpackFloats(rollout.poses);
-    this.frames = this.bodies ? Math.floor(this.poses.length / (STRIDE * this.bodies)) : 0;
+    this.poses = rollout.poses;
+    this.frames = rollout.frames;
     this.step = rollout.frame_seconds > 0 ? rollout.frame_seconds : 1 / 30;
     this.duration = Math.max(0, this.frames - 1) * this.step;
     this.start = new Vector3();
     this.end = new Vector3();
   }
+
+  /** The frame nearest to `time` (s). */
+  frameAt(time) { return Math.max(0, Math.min(this.frames - 1, Math.round(time / this.step))); }
 
   /** Puts an object where the body is at `time` (s): straight in position, slerp in orientation. */
   place(body, time, object) {

@@ -73,6 +73,14 @@ export class Orbit {
     if (!calm()) this.flight = requestAnimationFrame(step);
   }
 
+  /** Begins anew: `start` is what a reset goes to, `now` where it is. */
+  restart(start, now) {
+    cancelAnimationFrame(this.flight);
+    this.start = { ...start, target: start.target.clone() };
+    Object.assign(this, now, { target: now.target.clone() });
+    this.changed();
+  }
+
   reset() { this.fly({ ...this.start, target: this.start.target.clone() }); }
 
   /** Listens to a canvas. The wheel zooms only once the canvas has the focus, so that the page still scrolls. */

@@ -2,6 +2,8 @@
 
 export const FINGERS = ["#17924a", "#2563d9"];
 export const GOAL = "#2f9e5b";
+export const PAD_FORCE = "#d9730d";
+export const HAND_FORCE = "#7b2d8b";
 
 const METHOD_COLORS = { vmao: "#2c4a6e", "best-of-k": "#5b8a72", top1: "#b9792b" };
 const SPARE = ["#6b5b95", "#5a7d5a", "#8c4a4a", "#4d7f86"];

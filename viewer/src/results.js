@@ -13,7 +13,25 @@ const clamp = (value) => Math.min(1, Math.max(0, isNumber(value) ? value : 0));
 export function resultsSection(cells) {
   if (!cells.length) return [];
   const methods = [...new Set(cells.map((cell) => cell.method))];
-  return [successFigure(cells, methods), failureFigure(cells, methods), thresholdFigure(cells, methods)];
+  return [successFigure(cells, methods), failureFigure(cells, methods), goalsFigure(cells, methods), thresholdFigure(cells, methods)];
+}
+
+/** Goals that no choice of contacts can meet, apart from failures of the method. */
+function goalsFigure(cells, methods) {
+  const known = cells.filter((cell) => cell.goals);
+  if (!known.length) return null;
+  const table = el("table", { class: "goals" },
+    el("thead", {}, el("tr", {}, ["Grasp order", "Method"].map((name) => el("th", { scope: "col" }, name)),
+      ["within reach", "proven out of reach", "undecided", "drawn anew", "successes where not proven out of reach"].map((name) => el("th", { scope: "col", class: "number" }, name)))),
+    groupedRows(known, 7, (cell, before) => {
+      const { reachable, unreachable, unknown, redraws } = cell.goals;
+      const open = cell.trials - unreachable;
+      return el("tr", { class: before && before.order !== cell.order ? "break" : null }, cellNames(cell, before, methods),
+        [reachable, unreachable, unknown, redraws].map((n) => el("td", { class: n ? "number" : "number zero" }, count(n))),
+        el("td", { class: "number strong" }, open > 0 ? `${count(cell.successes)} of ${count(open)}` : "–"));
+    }));
+  return figure(numberOf("Table"), "Goals by what was known of them before anything moved: within reach, proven out of reach for every grasp looked at, or neither found. " +
+    "Goals out of reach count as failures in the tables above; the last column leaves out those that are proven.", el("div", { class: "scroll" }, table));
 }
 
 const groupName = (cell) => `${objectName(cell.object)} · ${robotNames(cell.robots ?? [])}`;

@@ -1,13 +1,13 @@
-// The three-dimensional scene of a rollout: bodies, light and shadow, the goal as a green ghost, asked contact points.
+// The three-dimensional scene of a rollout: bodies, light and shadow, the goal as a green ghost, asked contact points, forces.
 
 import {
-  AmbientLight, Box3, Color, DirectionalLight, Group, HemisphereLight, LessEqualDepth, Matrix4, Mesh, MeshBasicMaterial,
+  AmbientLight, Box3, Color, DirectionalLight, Group, HemisphereLight, LessEqualDepth, Mesh, MeshBasicMaterial,
   MeshStandardMaterial, Object3D, PlaneGeometry, Scene, ShadowMaterial, SphereGeometry, Vector3,
 } from "three";
-import { unpackFloats } from "./data.js";
+import { Forces } from "./forces.js";
 import { Motion, readPose } from "./motion.js";
 import { FINGERS, GOAL } from "./palette.js";
-import { distanceTo, placeSolid, solidGeometry } from "./solids.js";
+import { placeSolid, solidGeometry } from "./solids.js";
 
 const BALL = 0.0065; // m
 
@@ -24,7 +24,18 @@ export class RolloutScene {
     this.light();
     this.ground();
     this.contacts = this.makeContacts();
+    this.forces = new Forces(rollout);
+    this.scene.add(this.forces.group);
     this.place(0);
+  }
+
+  /** Gives the graphics card back what the scene took. */
+  dispose() {
+    this.scene.traverse((node) => {
+      node.geometry?.dispose();
+      node.material?.dispose?.();
+    });
+    this.shadow?.map?.dispose();
   }
 
   body({ solids, kind }) {
@@ -45,7 +56,7 @@ export class RolloutScene {
   /** The parts at the goal. A depth-only pass first, so that overlapping solids show one even green. */
   makeGhost() {
     const ghost = new Group();
-    const goal = unpackFloats(this.rollout.goal);
+    const goal = this.rollout.goal.flat();
     const hidden = new MeshBasicMaterial({ colorWrite: false, transparent: true });
     const green = new MeshStandardMaterial({ color: GOAL, emissive: new Color(GOAL), emissiveIntensity: 0.12, transparent: true, opacity: 0.58, depthFunc: LessEqualDepth, roughness: 0.8 });
     const parts = this.rollout.bodies.filter(({ kind }) => kind === "part");
@@ -142,41 +153,25 @@ export class RolloutScene {
   makeContacts() {
     const shape = new SphereGeometry(BALL, 24, 16);
     const out = [];
-    for (const [time, , first, second] of this.rollout.contacts) {
+    for (const { time, part, fingers } of this.rollout.contacts) {
       this.place(time);
       const shown = this.rollout.events.filter((event) => event.time < time - 1e-6).at(-1)?.time ?? 0;
-      [first, second].forEach((position, finger) => {
+      const carrier = this.bodies[this.rollout.bodies.findIndex(({ kind, index }) => kind === "part" && index === part)] ?? this.scene;
+      carrier.updateWorldMatrix(true, false);
+      fingers.forEach((position, finger) => {
         if (!position.every(Number.isFinite)) return;
-        const point = new Vector3(...position);
-        const carrier = this.nearestPart(point);
         const ball = new Group();
         // A faint second ball shows through the fingers that close over the point.
         ball.add(new Mesh(shape, new MeshStandardMaterial({ color: FINGERS[finger], emissive: new Color(FINGERS[finger]), emissiveIntensity: 0.35, roughness: 0.4 })));
         const through = new Mesh(shape, new MeshBasicMaterial({ color: FINGERS[finger], transparent: true, opacity: 0.35, depthTest: false }));
         through.renderOrder = 5;
         ball.add(through);
-        (carrier ?? this.scene).add(ball);
-        ball.position.copy(carrier ? carrier.worldToLocal(point) : point);
+        carrier.add(ball);
+        ball.position.copy(carrier.worldToLocal(new Vector3(...position)));
         out.push({ ball, shown });
       });
     }
     return out;
-  }
-
-  nearestPart(point) {
-    let best = null;
-    let least = Infinity;
-    const into = new Matrix4();
-    this.rollout.bodies.forEach(({ kind, solids }, i) => {
-      if (kind !== "part") return;
-      const group = this.bodies[i];
-      group.updateWorldMatrix(true, true);
-      group.children.slice(0, solids.length).forEach((mesh, k) => {
-        const distance = distanceTo(solids[k].shape, point.clone().applyMatrix4(into.copy(mesh.matrixWorld).invert()));
-        if (distance < least) [best, least] = [group, distance];
-      });
-    });
-    return best;
   }
 
   /** Solid arms, or arms like glass that do not hide the parts. */
@@ -192,6 +187,7 @@ export class RolloutScene {
     if (this.shadow && time !== this.time) this.shadow.needsUpdate = true;
     this.time = time;
     this.bodies.forEach((group, i) => this.motion.place(i, time, group));
+    this.forces?.place(this.motion.frameAt(time));
     for (const { ball, shown } of this.contacts ?? []) ball.visible = this.contactsOn !== false && time >= shown - 1e-9;
   }
 }

@@ -23,6 +23,28 @@ pub struct RolloutEvent {
     pub label: String,
 }
 
+/// Where an arm is asked to touch a part.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct RolloutContact {
+    /// Simulated time at which it was asked (s).
+    pub time: f64,
+    /// The arm.
+    pub arm: u16,
+    /// The part.
+    pub part: u16,
+    /// Points for finger 1 and finger 2, world frame at that time (m).
+    pub fingers: [[f64; 3]; 2],
+}
+
+/// What one pad of a gripper does to the object, mean over the time since the frame before.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+pub struct PadForce {
+    /// Middle of the contact, weighted by force, world frame (m); zeros without contact.
+    pub point: [f64; 3],
+    /// Force on the object, friction included, world frame (N).
+    pub force: [f64; 3],
+}
+
 /// A trial's motion, sampled at a fixed interval.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct Rollout {
@@ -36,8 +58,10 @@ pub struct Rollout {
     pub goal: Vec<Pose>,
     /// The stages, in time order.
     pub events: Vec<RolloutEvent>,
-    /// Points where fingers were asked to touch, world frame at the moment of the grasp: (time, arm, finger 1, finger 2).
-    pub contacts: Vec<(f64, u16, [f64; 3], [f64; 3])>,
+    /// Where fingers were asked to touch.
+    pub contacts: Vec<RolloutContact>,
+    /// The forces of both pads of every arm on the object: `forces[frame][arm][pad]`; as long as `frames`.
+    pub forces: Vec<Vec<[PadForce; 2]>>,
     /// The outcome in words: "success", or the failed stage and why.
     pub outcome: String,
 }

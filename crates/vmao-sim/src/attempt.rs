@@ -202,7 +202,7 @@ impl<'a> Attempt<'a> {
             self.grasps.push(GraspRecord { arm, contact, observation, world_from_part, world_from_gripper: None });
             let steps = self.simulation.steps;
             if let Some(recorder) = &mut self.simulation.recorder {
-                recorder.contact(steps, arm.0, &fingers);
+                recorder.contact(steps, (arm.0, part.0), &fingers);
             }
             contacts.push(proposals);
         }
@@ -290,7 +290,7 @@ impl<'a> Attempt<'a> {
         }
         if let Some(recorder) = &mut self.simulation.recorder {
             for (contact, part) in recorder.rollout.contacts.iter_mut().zip(&self.sequence).skip(first) {
-                contact.1 = taken_by(part).0;
+                contact.arm = taken_by(part).0;
             }
         }
         choices

@@ -129,23 +129,44 @@ pub(crate) fn internal_force(forces: &[Vector3<f64>]) -> f64 {
     forces.iter().map(|force| (force - mean).norm()).fold(0.0, f64::max)
 }
 
+/// One contact between an arm and the object.
+pub(crate) struct ObjectTouch {
+    pub(crate) arm: usize,
+    /// Which of its pads; none for another link.
+    pub(crate) pad: Option<usize>,
+    /// World frame (m).
+    pub(crate) point: Vector3<f64>,
+    /// On the object, friction included, world frame (N).
+    pub(crate) force: Vector3<f64>,
+}
+
 impl Simulation<'_> {
-    /// Net contact force of each arm on the object, world frame (N).
-    pub(crate) fn arm_forces(&self) -> Vec<Vector3<f64>> {
-        let mut forces = vec![Vector3::zeros(); self.scene.arms.len()];
-        for (index, contact) in self.data.contact().iter().enumerate() {
-            if contact.exclude != 0 {
-                continue;
-            }
+    /// The contacts between arms and the object, in the simulator's order.
+    pub(crate) fn touches(&self) -> impl Iterator<Item = ObjectTouch> {
+        self.data.contact().iter().enumerate().filter(|(_, contact)| contact.exclude == 0).filter_map(|(index, contact)| {
             // The contact frame's first axis points from the first geom to the second, and the force is that on the second.
-            let (arm, sign) = match contact.geom.map(|geom| self.scene.owners[geom as usize]) {
-                [Owner::Link(arm) | Owner::Pad(arm, _), Owner::Part(_)] => (arm, 1.0),
-                [Owner::Part(_), Owner::Link(arm) | Owner::Pad(arm, _)] => (arm, -1.0),
-                _ => continue,
+            let (owner, sign) = match contact.geom.map(|geom| self.scene.owners[geom as usize]) {
+                [owner, Owner::Part(_)] => (owner, 1.0),
+                [Owner::Part(_), owner] => (owner, -1.0),
+                _ => return None,
+            };
+            let (arm, pad) = match owner {
+                Owner::Link(arm) => (arm, None),
+                Owner::Pad(arm, pad) => (arm, Some(pad)),
+                Owner::Table | Owner::Part(_) => return None,
             };
             let [normal, first, second, ..] = self.data.contact_force(index);
             let world_from_contact = Matrix3::from_column_slice(&contact.frame);
-            forces[usize::from(arm.0)] += world_from_contact * Vector3::new(normal, first, second) * sign;
+            let force = world_from_contact * Vector3::new(normal, first, second) * sign;
+            Some(ObjectTouch { arm: usize::from(arm.0), pad, point: contact.pos.into(), force })
+        })
+    }
+
+    /// Net contact force of each arm on the object, world frame (N).
+    pub(crate) fn arm_forces(&self) -> Vec<Vector3<f64>> {
+        let mut forces = vec![Vector3::zeros(); self.scene.arms.len()];
+        for touch in self.touches() {
+            forces[touch.arm] += touch.force;
         }
         forces
     }

@@ -69,7 +69,7 @@ impl Attempt<'_> {
         }
         if let Some(recorder) = &mut self.simulation.recorder {
             for (noted, fingers) in recorder.rollout.contacts[first..].iter_mut().zip(contacts) {
-                (noted.2, noted.3) = (fingers[0].into(), fingers[1].into());
+                noted.fingers = fingers.map(Into::into);
             }
         }
     }

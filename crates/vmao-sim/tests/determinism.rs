@@ -77,7 +77,7 @@ fn recording_only_watches() {
         assert!(length <= on.record.steps as f64 * scene.timestep);
         assert!(rollout.events.is_sorted_by(|a, b| a.time <= b.time));
         // Nothing moves before the first grasp is asked for: it is the first thing that happens.
-        assert_eq!(rollout.contacts[0].0, 0.0, "times count from the first frame");
+        assert_eq!(rollout.contacts[0].time, 0.0, "times count from the first frame");
         assert!(rollout.events.iter().all(|event| (0.0..=length).contains(&event.time)), "{:?} of {length}", rollout.events);
         assert!(rollout.frames.iter().flatten().all(|pose| pose.translation.vector.iter().all(|x| x.is_finite())));
     }

@@ -4,6 +4,7 @@ use crate::failure::Failure;
 use crate::learned_contacts::{LearnedContacts, latent};
 use crate::report::{ContactMapFigure, LatentMap};
 use std::io::{self, Write};
+use vmao_core::contact::ContactMap;
 use vmao_core::observation::Observation;
 use vmao_core::random::Stream;
 
@@ -25,9 +26,16 @@ pub(crate) fn latent_maps(
     let map = |code| {
         let latent = latent(network, &mut Stream::new(seed, &[SHOWN_LATENTS, code]));
         let [finger1, finger2] = network.decode(&scene, &latent)?.fingers;
-        Ok(LatentMap { latent, finger1, finger2 })
+        Ok(LatentMap { latent, finger1, finger2, executed: None })
     };
     (0..codes).map(map).collect()
+}
+
+impl LatentMap {
+    /// The most probable point of each finger; the first of equal ones.
+    pub(crate) fn peaks(&self) -> [usize; 2] {
+        ContactMap { fingers: [self.finger1.clone(), self.finger2.clone()] }.peaks()
+    }
 }
 
 impl ContactMapFigure {

@@ -15,6 +15,7 @@ use serde::{Deserialize, Serialize};
 use std::collections::{BTreeMap, BTreeSet};
 use std::io::Write;
 use std::path::Path;
+use vmao_core::contact_model::ContactModel;
 use vmao_core::order::GraspOrder;
 use vmao_core::outcome::TrialOutcome;
 use vmao_core::random::Stream;
@@ -75,14 +76,22 @@ impl<'a> Evaluation<'a> {
 
     /// Runs one trial of the table; the same call gives the same trial, bit for bit.
     pub fn trial(&self, order: GraspOrder, method: Method, index: u64, recording: Recording) -> Option<Trial> {
-        let scene = &self.scenes[scene_of_trial(self.seed, index, self.scenes.len())];
-        let model = self.model(method)?;
-        Some(run_trial(scene, &self.config.trial_config(), model, order, (self.seed, index), recording))
+        self.model(method).map(|model| self.trial_by(model, order, index, recording))
+    }
+
+    /// Runs a trial of the table's scenes and goals with contacts that anyone chooses.
+    pub fn trial_by(&self, model: &dyn ContactModel, order: GraspOrder, index: u64, recording: Recording) -> Trial {
+        run_trial(self.scene(index), &self.config.trial_config(), model, order, (self.seed, index), recording)
+    }
+
+    /// The scene of a trial.
+    pub fn scene(&self, index: u64) -> &Scene {
+        &self.scenes[scene_of_trial(self.seed, index, self.scenes.len())]
     }
 
     /// Runs every cell in the current rayon pool, less the trials that are `there`; lines by order, method, index.
     ///
-    /// Every trial is kept as soon as it ends. Lines of trials that the table does not have are refused.
+    /// Every trial is kept with its motion as soon as it ends. Lines of trials that the table does not have are refused.
     pub fn run(&self, kept: &KeptTrials, there: Vec<TrialLine>) -> Result<Vec<TrialLine>, Failure> {
         let evaluate = &self.config.evaluate;
         let mut jobs = Vec::new();
@@ -103,9 +112,9 @@ impl<'a> Evaluation<'a> {
         bar.reset_eta();
         let missing: Vec<_> = jobs.iter().filter(|job| !lines.contains_key(job)).collect();
         let line = |&&(order, method, index): &&(GraspOrder, Method, u64)| {
-            let Some(trial) = self.trial(order, method, index, Recording::Off) else { return Ok(None) };
+            let Some(trial) = self.trial(order, method, index, Recording::On) else { return Ok(None) };
             let line = TrialLine::new(order, method, &trial);
-            kept.keep(&line)?;
+            kept.keep(&line, trial.rollout.as_ref())?;
             bar.inc(1);
             Ok(Some(line))
         };

@@ -4,17 +4,20 @@ use crate::evaluation::TrialLine;
 use crate::failure::Failure;
 use crate::interruption::writing;
 use crate::learning::{MAX_LINES_BYTES, json_lines, parse_lines, read, whole_lines};
+use crate::rollouts::StoredRollouts;
 use anyhow::Context;
 use std::fs::{self, File, OpenOptions};
 use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
+use vmao_core::rollout::Rollout;
 
 /// `trials.partial.jsonl`: a line for each trial, in the order in which they ended.
 #[derive(Debug)]
 pub struct KeptTrials {
     path: PathBuf,
     file: Mutex<File>,
+    rollouts: StoredRollouts,
 }
 
 impl KeptTrials {
@@ -37,11 +40,14 @@ impl KeptTrials {
             }
         }
         let file = Mutex::new(OpenOptions::new().append(true).open(&path).with_context(context)?);
-        Ok((Self { path, file }, lines))
+        Ok((Self { path, file, rollouts: StoredRollouts::open(directory, resume)? }, lines))
     }
 
-    /// Adds a trial.
-    pub fn keep(&self, line: &TrialLine) -> Result<(), Failure> {
+    /// Adds a trial: its motion first, so that a kept trial that recorded one has it.
+    pub fn keep(&self, line: &TrialLine, rollout: Option<&Rollout>) -> Result<(), Failure> {
+        if let Some(rollout) = rollout {
+            self.rollouts.keep(line, rollout)?;
+        }
         let text = serde_json::to_string(line)? + "\n";
         let _writing = writing();
         let mut file = self.file.lock().unwrap_or_else(PoisonError::into_inner);

@@ -1,7 +1,9 @@
-//! The report of a run directory: reads what the run left, runs again the few trials that are shown.
+//! The report of a run directory: reads what the run left, and carries out what latent codes of a few scenes lead to.
+
+mod live;
+mod rollouts;
 
 use crate::config::Config;
-use crate::contact_maps::latent_maps;
 use crate::dataset;
 use crate::evaluation::{Evaluation, TrialLine};
 use crate::failure::{Failure, OrBadInput};
@@ -10,23 +12,18 @@ use crate::learning::{json_lines, load_methods};
 use crate::output::write_whole;
 use crate::provenance::RunInfo;
 use crate::report::{
-    Cell, ContactMapFigure, ExplorationRound, ExplorationSummary, Provenance, ReportData, RolloutFigure, ThresholdPoint,
-    TrainingCurve, TrainingEpoch, render,
+    Cell, ExplorationRound, ExplorationSummary, Provenance, ReportData, ThresholdPoint, TrainingCurve, TrainingEpoch, render,
 };
-use crate::results::{Method, Results};
+use crate::results::Results;
+use crate::rollouts::StoredRollouts;
 use crate::training_log::{EpochLine, curves};
 use anyhow::Context;
 use std::collections::BTreeMap;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 use vmao_core::catalogue::InstanceSet;
-use vmao_core::order::GraspOrder;
 use vmao_core::outcome::TrialOutcome;
 use vmao_net::ModelKind;
-use vmao_sim::Recording;
-
-/// Latent codes shown for each scene, as in the supplement's Figure 4.
-const LATENTS_SHOWN: u64 = 5;
 
 /// Writes `report.html` into a run directory and returns its path.
 pub fn write_report(directory: &Path) -> Result<PathBuf, Failure> {
@@ -37,12 +34,15 @@ pub fn write_report(directory: &Path) -> Result<PathBuf, Failure> {
     let models = directory.join("models");
     let evaluation = Evaluation::new(&config, info.seed, load_methods(&models, &config)?)?;
     let (exploration, digest) = explored(&config, &directory.join("data"))?;
+    let motions = rollouts::motions(&evaluation, &StoredRollouts::of(directory), &lines)?;
     let data = ReportData {
         title: format!("vmao · {} with {}", config.object_name(), config.robots.names.join(" + ")),
         summary: summary(&results),
         cells: cells(&results, &lines)?,
-        contact_maps: contact_maps(&evaluation, &lines, info.seed)?,
-        rollouts: rollouts(&evaluation, &lines),
+        contact_maps: live::scenes(&evaluation, &lines, info.seed)?,
+        rollouts: motions.figures,
+        rollouts_note: motions.note,
+        failure_classes: motions.classes,
         training: training(&models)?,
         exploration,
         provenance: Provenance {
@@ -85,53 +85,6 @@ fn cells(results: &Results, lines: &[TrialLine]) -> Result<Vec<Cell>, Failure> {
         Ok(shown)
     };
     results.cells.iter().map(shown).collect()
-}
-
-/// The second grasp's maps for five latent codes, on the first scenes that V-MAO solved in each order.
-fn contact_maps(evaluation: &Evaluation<'_>, lines: &[TrialLine], seed: u64) -> Result<Vec<ContactMapFigure>, Failure> {
-    let Some(model) = evaluation.model(Method::Vmao) else { return Ok(Vec::new()) };
-    let mut figures = Vec::new();
-    for (order, title, caption) in [
-        (
-            GraspOrder::Sequential,
-            "Lifted by the first gripper",
-            "The first gripper holds the object at its goal; the second looks.",
-        ),
-        (GraspOrder::Parallel, "Lying on the table", "Nothing is grasped yet."),
-    ] {
-        let is_shown = |line: &&TrialLine| line.order == order && line.method == Method::Vmao && line.outcome.is_success();
-        let Some(line) = lines.iter().find(is_shown) else { continue };
-        let trial = evaluation.trial(order, Method::Vmao, line.index, Recording::Off);
-        let Some(second) = trial.as_ref().and_then(|trial| trial.record.grasps.get(1)) else { continue };
-        let part = usize::from(second.contact.part.0);
-        let maps = latent_maps(model, part, &second.observation, seed, LATENTS_SHOWN)?;
-        let caption = format!("Trial {}. {caption}", line.index);
-        figures.push(ContactMapFigure::new(title.to_owned(), caption, &second.observation, maps));
-    }
-    Ok(figures)
-}
-
-/// A success of each order and the failure that got furthest.
-fn rollouts(evaluation: &Evaluation<'_>, lines: &[TrialLine]) -> Vec<RolloutFigure> {
-    let mut shown: Vec<&TrialLine> = Vec::new();
-    for order in [GraspOrder::Sequential, GraspOrder::SequentialParallel, GraspOrder::Parallel] {
-        shown.extend(lines.iter().find(|line| line.order == order && line.method == Method::Vmao && line.outcome.is_success()));
-    }
-    let failed = lines.iter().filter(|line| !line.outcome.is_success());
-    // One that ended before anything moved has nothing to play, whoever chose its contacts.
-    let telling = |line: &&TrialLine| (line.steps, line.method == Method::Vmao, std::cmp::Reverse(line.index));
-    shown.extend(failed.max_by_key(telling));
-    let figure = |line: &TrialLine| {
-        let rollout = evaluation.trial(line.order, line.method, line.index, Recording::On)?.rollout?;
-        let what = match line.outcome {
-            TrialOutcome::Success => "Success".to_owned(),
-            TrialOutcome::Failed(stage) => format!("Failure: {}", stage.name()),
-        };
-        let title = format!("{what} · {} · {}", line.order.name(), line.method.title());
-        let caption = format!("Trial {}.{}{}", line.index, if line.detail.is_empty() { "" } else { " " }, line.detail);
-        Some(RolloutFigure { title, caption, rollout })
-    };
-    shown.into_iter().filter_map(figure).collect()
 }
 
 fn training(models: &Path) -> Result<Vec<TrainingCurve>, Failure> {

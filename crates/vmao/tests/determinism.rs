@@ -1,4 +1,4 @@
-//! The same seed gives the same bytes with one worker and with two: data set, weights, maps, results.
+//! The same seed gives the same bytes with one worker and with two: data set, weights, maps, results, motions with forces.
 #![expect(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
 use std::{
@@ -37,7 +37,8 @@ fn one_worker_and_two_write_the_same_bytes() {
     let answer = run_loop(&one, "1", "3");
     assert_eq!(answer, run_loop(&two, "2", "3"));
     assert!(answer.contains("\"digest\":"), "{answer}");
-    let mut files = vec!["table/results.json".to_owned(), "table/trials.jsonl".to_owned()];
+    let mut files =
+        ["table/results.json", "table/trials.jsonl", "table/rollouts/sequential-vmao-0.json"].map(str::to_owned).to_vec();
     for model in ["vmao", "top1"] {
         files.push(format!("models/{model}/training.jsonl"));
         for grasp in ["grasp-0", "grasp-1"] {

@@ -3,6 +3,8 @@
 mod synthetic;
 
 use vmao::report::{Cell, ReportData, TrainingCurve, TrainingEpoch, render};
+use vmao::rollouts::PackedRollout;
+use vmao_core::geometry::rotation_distance;
 
 /// The JSON that a page carries, read back the way a browser finds it.
 #[track_caller]
@@ -23,10 +25,28 @@ fn a_full_report_is_written_for_looking_at() {
     assert_eq!(data["cells"][0]["order"], "sequential");
     assert_eq!(data["contact_maps"][0]["maps"].as_array().unwrap().len(), 5);
     assert_eq!(data["provenance"]["seed"], u64::MAX.to_string());
-    let rollout = &data["rollouts"][0]["rollout"];
-    let (bodies, frames) = (rollout["bodies"].as_array().unwrap().len(), synthetic::motion::rollout(false).frames.len());
-    // base64 of 7 little-endian f32 for every body of every frame
-    assert_eq!(rollout["poses"].as_str().unwrap().len(), (bodies * frames * 28).div_ceil(3) * 4);
+    let made = synthetic::motion::rollout(false);
+    let shown = &data["rollouts"][0];
+    assert_eq!((shown["trial"]["index"].as_u64(), shown["trial"]["failed"].is_null()), (Some(17), true));
+    assert_eq!(data["rollouts"][1]["trial"]["failed"], "slip");
+    assert_eq!(data["failure_classes"][0]["example"], 1);
+    assert_eq!(data["cells"][0]["goals"]["unreachable"], 2);
+    assert_eq!(data["contact_maps"][0]["maps"][4]["executed"]["title"], "Code 5: success");
+    // What the page carries is the motion that was given, to the stated precision.
+    let packed: PackedRollout = serde_json::from_value(shown["rollout"].clone()).unwrap();
+    let back = packed.unpack().unwrap();
+    assert_eq!(
+        (back.bodies.len(), back.frames.len(), back.forces.len()),
+        (made.bodies.len(), made.frames.len(), made.frames.len())
+    );
+    for (made, back) in made.frames.iter().flatten().zip(back.frames.iter().flatten()) {
+        assert!((made.translation.vector - back.translation.vector).amax() <= 0.5e-4 + 1e-9);
+        assert!(rotation_distance(&made.rotation, &back.rotation) < 2e-4);
+    }
+    for (made, back) in made.forces.iter().flatten().flatten().zip(back.forces.iter().flatten().flatten()) {
+        assert!(made.force.iter().zip(back.force).all(|(a, b)| (a - b).abs() <= 0.005 + 1e-9));
+    }
+    assert_eq!((&back.contacts, &back.events, &back.outcome), (&made.contacts, &made.events, &made.outcome));
     assert_eq!(page, render(&synthetic::report()), "the same data gives the same page");
 }
 
@@ -63,6 +83,30 @@ fn hostile_text_stays_text() {
 }
 
 #[test]
+fn a_packed_motion_that_no_trial_made_is_refused_in_words() {
+    let good = PackedRollout::pack(&synthetic::motion::rollout(false)).unwrap();
+    let check = |change: &dyn Fn(&mut PackedRollout), message: &str| {
+        let mut bad = good.clone();
+        change(&mut bad);
+        let found = bad.unpack().unwrap_err();
+        assert!(found.contains(message), "{found}");
+    };
+    check(&|bad| bad.frame_seconds = 0.0, "frame_seconds: 0");
+    check(&|bad| bad.bodies.truncate(40), "bodies: ");
+    check(&|bad| bad.body_count += 1, "expected body_count");
+    check(&|bad| bad.frames = usize::MAX, "motion: ");
+    check(&|bad| bad.frames -= 1, "after the last column");
+    check(&|bad| bad.arms = 1 << 40, "forces: ");
+    check(&|bad| bad.goal.truncate(1), "goal: 1 poses, expected 2");
+    // Recorded without forces, as older programs did: the motion is there, the forces are not.
+    let mut older = synthetic::motion::rollout(false);
+    older.forces.clear();
+    let packed = PackedRollout::pack(&older).unwrap();
+    assert_eq!(packed.arms, 0);
+    assert!(packed.unpack().unwrap().forces.iter().all(Vec::is_empty));
+}
+
+#[test]
 fn a_cell_of_results_json_is_a_row_of_the_table() {
     let cell: Cell = serde_json::from_str(
         r#"{"object": "three-sticks", "robots": ["sawyer", "sawyer", "sawyer"], "order": "sequential-parallel", "method": "vmao",
@@ -85,7 +129,11 @@ fn an_empty_report_and_numbers_that_are_none_are_still_json() {
     data.contact_maps[0].points[0] = [f32::NAN; 3];
     data.contact_maps[0].maps[0].finger1[0] = f32::NAN;
     data.contact_maps[0].maps[0].latent[0] = f32::INFINITY;
-    data.rollouts[0].rollout.frames[3][2].translation.x = f64::NAN;
+    let mut astray = synthetic::motion::rollout(false);
+    astray.frames[3][2].translation.x = f64::NAN;
+    astray.frames[4][2].translation.x = f64::INFINITY;
+    astray.frames.truncate(9);
+    data.rollouts[0].rollout = PackedRollout::pack(&astray).unwrap();
     let none =
         TrainingEpoch { train_reconstruction: f64::NAN, validation_reconstruction: 1.0, kl: f64::INFINITY, beta: f64::NAN };
     data.training.push(TrainingCurve { model: "broken".into(), epochs: vec![none; 3] });

@@ -10,6 +10,7 @@ use crate::{
     provenance::RunInfo,
     replay::{data_directory, difference, run_again},
     report::{Provenance, ReportData, RolloutFigure, render},
+    rollouts::PackedRollout,
     statistics::statistics,
 };
 use anyhow::Context;
@@ -122,12 +123,12 @@ fn show(directory: &Path, trial: u64, session: &Session) -> Result<(), Failure> 
         TrialOutcome::Failed(stage) => (format!("failure at {}", stage.name()), format!(" {}.", record.detail)),
     };
     let title = format!("Trial {trial}: {what}");
-    let rollout = again.rollout.unwrap_or_default();
+    let rollout = PackedRollout::pack(&again.rollout.unwrap_or_default())?;
     let caption = format!("{} order, {} steps.{why}", record.order.name(), record.steps);
     let data = ReportData {
         title: format!("vmao · {} with {} · trial {trial}", config.object_name(), config.robots.names.join(" + ")),
         summary: format!("Trial {trial} of {}, {what}; run again from its record, equal bit for bit.", directory.display()),
-        rollouts: vec![RolloutFigure { title, caption, rollout }],
+        rollouts: vec![RolloutFigure { title, caption, trial: None, rollout }],
         provenance: Provenance {
             command: session.info.command.join(" "),
             version: info.version.clone(),

@@ -33,7 +33,7 @@ pub(super) struct EvaluateArguments {
     pub(super) common: CommonOptions,
 }
 
-fn parse_order(name: &str) -> Result<GraspOrder, String> {
+pub(super) fn parse_order(name: &str) -> Result<GraspOrder, String> {
     let orders = [GraspOrder::Parallel, GraspOrder::SequentialParallel, GraspOrder::Sequential];
     let found = orders.into_iter().find(|order| order.name() == name);
     found.ok_or_else(|| format!("orders are: {}", orders.map(GraspOrder::name).join(", ")))

@@ -7,6 +7,8 @@ mod dataset;
 mod demo;
 mod evaluate;
 mod explore;
+mod export;
+mod figures;
 mod ik;
 mod object;
 mod object_import;
@@ -68,6 +70,10 @@ enum Command {
     Evaluate(evaluate::EvaluateArguments),
     /// report.html of a run
     Report(report::ReportArguments),
+    /// Key frames and contact maps of a run as pictures, and what lifting changes (the supplement's Figures 3 and 4)
+    Figures(figures::FiguresArguments),
+    /// A trial of a run as an animated GIF
+    Export(export::ExportArguments),
     /// Run recorded trials again and compare them bit for bit
     Verify(verify::VerifyArguments),
     /// Meshes of the robots, for pictures
@@ -133,6 +139,8 @@ fn execute(command: Command, command_line: &[String]) -> Result<(), Failure> {
         Command::Score(arguments) => score::run(&arguments, session(&arguments.common)?),
         Command::Evaluate(arguments) => evaluate::run(&arguments, session(&arguments.common)?),
         Command::Report(arguments) => report::run(&arguments, &session(&arguments.common)?),
+        Command::Figures(arguments) => figures::run(&arguments, &session(&arguments.common)?),
+        Command::Export(arguments) => export::run(&arguments, &session(&arguments.common)?),
         Command::Verify(arguments) => verify::run(&arguments, &session(&arguments.common)?),
         Command::Robot(arguments) => robot::run(&arguments, &session(arguments.action.common())?),
         Command::Scene(arguments) => scene::run(&arguments, &session(&arguments.common)?),

@@ -1,9 +1,11 @@
 //! What a report holds. Every section may be empty; numbers that are not finite arrive in the page as gaps.
 
 use super::pack;
+use crate::results::GoalCounts;
+use crate::rollouts::PackedRollout;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
-use vmao_core::{observation::PointLabel, order::GraspOrder, outcome::FailureStage, rollout::Rollout};
+use vmao_core::{observation::PointLabel, order::GraspOrder, outcome::FailureStage};
 
 /// Everything that report.html shows, in the order of the page.
 #[derive(Debug, Clone, PartialEq, Default, Serialize)]
@@ -18,6 +20,10 @@ pub struct ReportData {
     pub contact_maps: Vec<ContactMapFigure>,
     /// Recorded motions to play.
     pub rollouts: Vec<RolloutFigure>,
+    /// What to say before the motions: how many are here of how many, and which.
+    pub rollouts_note: String,
+    /// The failure classes that occurred, and what would help.
+    pub failure_classes: Vec<FailureClass>,
     /// Loss curves, one entry for each model.
     pub training: Vec<TrainingCurve>,
     /// How the label set grew.
@@ -47,6 +53,9 @@ pub struct Cell {
     pub wilson95: [f64; 2],
     /// Failed trials by the first stage that failed; absent stages count as zero.
     pub failures: BTreeMap<FailureStage, u64>,
+    /// What was known of the goals of its trials; none in files of older versions.
+    #[serde(default)]
+    pub goals: Option<GoalCounts>,
     /// Success rate with every threshold scaled; empty if it was not computed.
     #[serde(default)]
     pub threshold_curve: Vec<ThresholdPoint>,
@@ -92,6 +101,8 @@ pub struct LatentMap {
     /// Probability of each point for finger 2.
     #[serde(serialize_with = "pack::floats")]
     pub finger2: Vec<f32>,
+    /// The trial in which the map's most probable points were grasped, if it was run.
+    pub executed: Option<RolloutFigure>,
 }
 
 /// A motion to play.
@@ -101,9 +112,38 @@ pub struct RolloutFigure {
     pub title: String,
     /// What to say before the standing caption.
     pub caption: String,
+    /// Where the motion stands in the table, if it does; the page lists by it.
+    pub trial: Option<TrialPlace>,
     /// The motion.
-    #[serde(serialize_with = "pack::rollout")]
-    pub rollout: Rollout,
+    pub rollout: PackedRollout,
+}
+
+/// Which trial of the table a motion is.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct TrialPlace {
+    /// The grasp order.
+    pub order: GraspOrder,
+    /// The contact model.
+    pub method: String,
+    /// Number of the trial.
+    pub index: u64,
+    /// The first stage that failed; none for a success.
+    pub failed: Option<FailureStage>,
+}
+
+/// A way in which trials of this run failed.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct FailureClass {
+    /// The first stage that failed.
+    pub stage: FailureStage,
+    /// Trials of the table that failed so.
+    pub count: u64,
+    /// What it means.
+    pub meaning: String,
+    /// What would help.
+    pub remedy: String,
+    /// Position in `rollouts` of a trial that failed so, if one is there.
+    pub example: Option<usize>,
 }
 
 /// The losses of one model.

@@ -5,9 +5,11 @@ pub(crate) mod motion;
 use nalgebra::{Point3, Vector3};
 use std::collections::BTreeMap;
 use vmao::report::{
-    Cell, ContactMapFigure, ExplorationRound, ExplorationSummary, LatentMap, Provenance, ReportData, RolloutFigure,
-    ThresholdPoint, TrainingCurve, TrainingEpoch,
+    Cell, ContactMapFigure, ExplorationRound, ExplorationSummary, FailureClass, LatentMap, Provenance, ReportData, RolloutFigure,
+    ThresholdPoint, TrainingCurve, TrainingEpoch, TrialPlace,
 };
+use vmao::results::GoalCounts;
+use vmao::rollouts::PackedRollout;
 use vmao_core::{observation::PointLabel, order::GraspOrder, outcome::FailureStage, random::Stream, shape::Shape};
 
 fn wilson(successes: f64, n: f64) -> [f64; 2] {
@@ -35,6 +37,7 @@ fn cell(order: GraspOrder, method: &str, counts: [u64; 7]) -> Cell {
         rate,
         wilson95: wilson(successes as f64, trials as f64),
         failures: FailureStage::ALL.into_iter().zip(counts).collect(),
+        goals: Some(GoalCounts { reachable: trials - 3, unreachable: 2, unknown: 1, redraws: 0 }),
         threshold_curve: (0..=20).map(curve).collect(),
     }
 }
@@ -54,6 +57,13 @@ fn surface(shape: &Shape, stream: &mut Stream) -> Point3<f64> {
         }
         Shape::Convex(ref hull) => hull.vertices()[stream.index(hull.vertices().len())],
     }
+}
+
+/// The made-up motion as a figure; `trial` is its number and where it failed.
+fn figure_of(title: &str, trial: Option<(u64, Option<FailureStage>)>, fails: bool) -> RolloutFigure {
+    let place = |(index, failed)| TrialPlace { order: GraspOrder::Sequential, method: "vmao".into(), index, failed };
+    let rollout = PackedRollout::pack(&motion::rollout(fails)).expect("packing writes to memory");
+    RolloutFigure { title: title.into(), caption: String::new(), trial: trial.map(place), rollout }
 }
 
 /// The scene before the second grasp, with maps that slide along the second handle from code to code.
@@ -106,7 +116,8 @@ fn contact_maps() -> ContactMapFigure {
                 raw.iter().map(|value| (value / sum) as f32).collect::<Vec<f32>>()
             };
             let (finger1, finger2) = (channel(1.0), channel(-1.0));
-            LatentMap { latent: (0..16).map(|_| stream.normal() as f32).collect(), finger1, finger2 }
+            let executed = Some(figure_of(&format!("Code {}: success", code + 1), None, code > 2));
+            LatentMap { latent: (0..16).map(|_| stream.normal() as f32).collect(), finger1, finger2, executed }
         })
         .collect();
     figure
@@ -153,9 +164,17 @@ pub(crate) fn report() -> ReportData {
         ],
         contact_maps: vec![contact_maps()],
         rollouts: vec![
-            RolloutFigure { title: "Trial 17, V-MAO, sequential".into(), caption: String::new(), rollout: motion::rollout(false) },
-            RolloutFigure { title: "Trial 23, V-MAO, sequential".into(), caption: String::new(), rollout: motion::rollout(true) },
+            figure_of("Trial 17, V-MAO, sequential", Some((17, None)), false),
+            figure_of("Trial 23, V-MAO, sequential", Some((23, Some(FailureStage::Slip))), true),
         ],
+        rollouts_note: "2 of the table's 240 trials can be played here.".into(),
+        failure_classes: vec![FailureClass {
+            stage: FailureStage::Slip,
+            count: 13,
+            meaning: "A part was lost.".into(),
+            remedy: "Hold it.".into(),
+            example: Some(1),
+        }],
         training: vec![training("vmao", 3.1, true), training("top1", 3.6, false)],
         exploration: Some(ExplorationSummary { trials, successes, demonstrations: 8, failures, rounds }),
         provenance: Provenance {

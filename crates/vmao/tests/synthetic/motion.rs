@@ -4,7 +4,7 @@ use nalgebra::{Point3, UnitQuaternion, Vector3};
 use vmao_core::{
     geometry::{Pose, interpolate, minimum_jerk, pose, rotation_exp, translation},
     observation::PointLabel,
-    rollout::{Rollout, RolloutBody, RolloutEvent},
+    rollout::{PadForce, Rollout, RolloutBody, RolloutContact, RolloutEvent},
     shape::{Shape, Solid},
 };
 
@@ -162,7 +162,7 @@ pub(crate) fn rollout(fails: bool) -> Rollout {
         let name = ["handle-a", "handle-b"][part].into();
         bodies.push(RolloutBody { name, label: PointLabel::Part(part as u16), solids: pliers_half(part) });
     }
-    let frames = (0..=(end / SECONDS) as usize)
+    let frames: Vec<Vec<Pose>> = (0..=(end / SECONDS) as usize)
         .map(|k| {
             let time = k as f64 * SECONDS;
             let mut frame = vec![translation(0.0, 0.0, -0.02)];
@@ -175,8 +175,22 @@ pub(crate) fn rollout(fails: bool) -> Rollout {
         .collect();
     let touch = |index: usize, time: f64| {
         let at = |y: f64| -> [f64; 3] { (object(time)[index] * grasp(index) * Point3::new(0.0, y, 0.0)).coords.into() };
-        (time, index as u16, at(0.009), at(-0.009))
+        RolloutContact { time, arm: index as u16, part: index as u16, fingers: [at(0.009), at(-0.009)] }
     };
+    // Each hand squeezes with 12 N from when it has closed, and carries 1.5 N upward while the object moves.
+    let pads = |index: usize, time: f64| {
+        let holds = time > if index == 0 { 2.8 } else { 5.8 } && !(fails && index == 1 && time > lost);
+        [0.009, -0.009].map(|y| {
+            if !holds {
+                return PadForce::default();
+            }
+            let world = object(time)[index] * grasp(index);
+            let up = if time > 6.0 { 0.75 } else { 0.0 };
+            let squeeze = world.rotation * Vector3::new(0.0, -12.0 * y / 0.009, 0.0);
+            PadForce { point: (world * Point3::new(0.0, y, 0.0)).coords.into(), force: (squeeze + Vector3::z() * up).into() }
+        })
+    };
+    let forces = (0..frames.len()).map(|k| [0, 1].map(|arm| pads(arm, k as f64 * SECONDS)).to_vec()).collect();
     let mut stages = vec![
         (0.0, "approach handle-a with arm 0"),
         (1.5, "reach the contact points"),
@@ -196,6 +210,7 @@ pub(crate) fn rollout(fails: bool) -> Rollout {
         goal: halves(&goal, open).to_vec(),
         events: stages.into_iter().map(|(time, label)| RolloutEvent { time, label: label.into() }).collect(),
         contacts: vec![touch(0, 2.4), touch(1, 5.4)],
+        forces,
         outcome: if fails { "slip: arm 1 lost handle-b 0.11 m above the table".into() } else { "success".into() },
     }
 }
