@@ -90,7 +90,7 @@ function relative(values, length) {
   }
   const most = peak < 0 ? 1 : out[peak];
   for (let i = 0; i < length; i++) out[i] /= most;
-  return [out, peak, peak < 0 ? 0 : most];
+  return [out, peak < 0 ? 0 : most];
 }
 
 function ball(color, radius, position) {
@@ -136,17 +136,17 @@ export function cloudBase(points, colors, kinds) {
   return { count: n, positions: new BufferAttribute(positions, 3), tints: new BufferAttribute(tints, 3), quiet: new BufferAttribute(quiet, 1) };
 }
 
-/** A scene with the cloud, one contact map over it and a ball at each finger's most probable point. */
-export function mapScene(base, frame, first, second) {
+/** A scene with the cloud, one contact map over it and a ball at each finger's chosen point. */
+export function mapScene(base, frame, first, second, chosen) {
   const geometry = new BufferGeometry();
   geometry.setAttribute("position", base.positions);
   geometry.setAttribute("tint", base.tints);
   geometry.setAttribute("quiet", base.quiet);
   const peaks = [];
   for (const [name, values] of [["first", first], ["second", second]]) {
-    const [scaled, peak, most] = relative(values, base.count);
+    const [scaled, most] = relative(values, base.count);
     geometry.setAttribute(name, new BufferAttribute(scaled, 1));
-    peaks.push({ peak, most, point: peak < 0 ? null : new Vector3().fromBufferAttribute(base.positions, peak) });
+    peaks.push({ most, point: most > 0 ? new Vector3().fromBufferAttribute(base.positions, chosen[peaks.length]) : null });
   }
   const material = new ShaderMaterial({
     vertexShader: VERTEX, fragmentShader: FRAGMENT,

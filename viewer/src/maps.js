@@ -31,7 +31,7 @@ export function mapsSection(figures, stage) {
 }
 
 const caption = (entry) => `${sentences(entry.caption)}Contact maps of one scene for ${entry.maps.length} latent codes: finger 1 in green, ` +
-  "finger 2 in blue, shaded by probability relative to each finger's maximum; a ball marks the most probable point. " +
+  "finger 2 in blue, shaded by probability relative to each finger's maximum; a ball marks the point that is grasped. " +
   "Where the probability is low the object keeps a pale shade of its own colour; table and arms are paler still. All views share one camera.";
 
 function mapsFigure(entry, name, stage) {
@@ -42,7 +42,7 @@ function mapsFigure(entry, name, stage) {
   const kinds = unpackBytes(entry.labels);
   const frame = cloudFrame(points, kinds);
   const base = cloudBase(points, unpackBytes(entry.colors), kinds);
-  const maps = entry.maps.map((map) => ({ latent: map.latent ?? [], ...mapScene(base, frame, unpackFloats(map.finger1), unpackFloats(map.finger2)) }));
+  const maps = entry.maps.map((map) => ({ latent: map.latent ?? [], ...mapScene(base, frame, unpackFloats(map.finger1), unpackFloats(map.finger2), map.peaks) }));
   const distance = (1.04 * frame.radius) / Math.sin((FIELD * Math.PI) / 360);
   const orbit = new Orbit({ target: frame.middle, distance, azimuth: -Math.PI / 3, elevation: 0.82 });
   const views = [];
@@ -96,7 +96,7 @@ function mapsFigure(entry, name, stage) {
     views.forEach((each) => each.invalidate());
   } });
   const aside = el("div", { class: "map-side" }, facts, blendLegend(),
-    el("div", { class: "controls" }, el("label", {}, peaks, " Most probable points"),
+    el("div", { class: "controls" }, el("label", {}, peaks, " Points that are grasped"),
       el("button", { type: "button", onclick: () => orbit.reset() }, "Reset view")),
     el("p", { class: "hint" }, "Drag to turn, shift-drag to move, scroll to zoom once focused, arrow keys to turn, + and − to zoom, 0 to reset."));
   return figure(name, caption(entry), title, el("div", { class: "five", style: { "--views": String(Math.min(5, maps.length)) } }, panels.map(({ node }) => node)),
@@ -128,7 +128,7 @@ function mapFacts({ latent, peaks }, title) {
     latent.length > 0 && el("div", { class: "latent-large" }, latentBars(latent, 240, 56),
       el("span", { class: "quiet" }, `latent code, ${latent.length} number${latent.length === 1 ? "" : "s"}, ±3`)),
     el("dl", { class: "pairs" },
-      el("dt", {}, "Distance between the peaks"), el("dd", {}, span),
+      el("dt", {}, "Distance between the points"), el("dd", {}, span),
       el("dt", {}, el("span", { class: "dot", style: { "--ink": FINGERS[0] } }), "Highest probability, finger 1"), el("dd", {}, top(one)),
       el("dt", {}, el("span", { class: "dot", style: { "--ink": FINGERS[1] } }), "Highest probability, finger 2"), el("dd", {}, top(two))),
   ].filter(Boolean);

@@ -67,10 +67,11 @@ pub fn squared(fingers: &[Point3<f64>; 2], points: &[Point3<f64>], limit: f64) -
     let bar = direction_of_bar(&near)?;
     let along = fingers[0] - fingers[1];
     let mut square = along - bar * bar.dot(&along);
-    let reach = square.norm() / 2.0 + SLICE_MARGIN;
+    // Two points on one side of the bar say where along it, not how wide it is.
+    let reach = if square.norm() < ONE_SIDE { WIDEST_BAR } else { square.norm() / 2.0 + SLICE_MARGIN };
     let tilt = square.z.abs().atan2(square.xy().norm());
     // Level first, then square again within the level plane, unless the bar itself stands upright.
-    if tilt < limit {
+    if tilt < STEEP {
         let across = bar.cross(&Vector3::z());
         if across.norm() > 0.3 {
             square = across * across.dot(&along);
@@ -80,7 +81,8 @@ pub fn squared(fingers: &[Point3<f64>; 2], points: &[Point3<f64>], limit: f64) -
     let slice = |offset: &&Vector3<f64>| offset.dot(&bar).abs() < SLICE && (*offset - bar * offset.dot(&bar)).norm() < reach;
     let slice: Vec<Vector3<f64>> = near.iter().filter(slice).copied().collect();
     let (direction, [low, high]) = narrowest(&slice, &Unit::new_unchecked(bar), square)?;
-    if direction.dot(&along) < along.norm() * limit.cos() {
+    // Either way round is the same grasp.
+    if direction.dot(&along).abs() < along.norm() * limit.cos() {
         return None;
     }
     let at = |place: f64| middle + direction * place;
@@ -124,6 +126,11 @@ const BAR_ELONGATION: f64 = 1.6;
 /// Points this far along the bar (m), and so much farther across it than the contacts (m), show its cross-section.
 const SLICE: f64 = 0.014;
 const SLICE_MARGIN: f64 = 0.006;
+/// Contacts nearer than this across the bar lie on one side of it (m); then this far around them shows the cross-section (m).
+const ONE_SIDE: f64 = 0.008;
+const WIDEST_BAR: f64 = 0.024;
+/// A steeper closing axis holds the bar from above and below (rad).
+const STEEP: f64 = 1.4;
 /// Directions about the bar that are compared (rad), and what turning costs (m/rad): more than noise, less than an edge.
 const MOST_TURN: f64 = 0.75;
 const TURN_STEP: f64 = 0.03;
@@ -195,6 +202,11 @@ mod tests {
         let [first, second] = square.map(|point| turn.inverse() * (roll.inverse() * point));
         assert!((first.y - 0.008).abs() < 1e-3 && (second.y + 0.008).abs() < 1e-3, "{first} {second}");
         assert!((first.z - second.z).abs() < 0.6e-3, "{first} {second}");
+        // Both fingers' points on one side, one behind the other: across the bar where they are.
+        let one_side = [Point3::new(0.01, 0.008, 0.01), Point3::new(-0.01, 0.007, 0.01)].map(|point| turn * point);
+        let square = squared(&one_side, &bar, std::f64::consts::FRAC_PI_2).unwrap().map(|point| turn.inverse() * point);
+        assert!((square[0].y - square[1].y).abs() > 0.0155 && square.iter().all(|p| p.x.abs() < 1e-3), "{square:?}");
+        assert!((square[0].y + square[1].y).abs() < 1e-3, "about the bar's middle: {square:?}");
         let mut stream = crate::random::Stream::new(1, &[]);
         let ball: Vec<Point3<f64>> = (0..400)
             .filter_map(|_| Vector3::new(stream.normal(), stream.normal(), stream.normal()).try_normalize(1e-6))

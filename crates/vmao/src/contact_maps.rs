@@ -4,20 +4,20 @@ use crate::failure::Failure;
 use crate::learned_contacts::{LearnedContacts, latent};
 use crate::report::{ContactMapFigure, LatentMap};
 use std::io::{self, Write};
-use vmao_core::contact::ContactMap;
 use vmao_core::observation::Observation;
 use vmao_core::random::Stream;
 
 /// Names the stream of the latent codes that are shown.
 const SHOWN_LATENTS: u64 = 1 << 35;
 
-/// The maps of `codes` latent codes for `part` on one observation.
+/// The maps of `codes` latent codes for `part` on one observation, with the points that a gripper of this `span` (m) is sent to.
 ///
 /// The seed decides the codes, so that code 2 of one scene can be compared with code 2 of another (supplement, Figure 4).
 pub(crate) fn latent_maps(
     model: &LearnedContacts,
     part: usize,
     seen: &Observation,
+    span: [f64; 2],
     seed: u64,
     codes: u64,
 ) -> Result<Vec<LatentMap>, Failure> {
@@ -25,17 +25,12 @@ pub(crate) fn latent_maps(
     let scene = network.encode(&seen.points, &seen.colors)?;
     let map = |code| {
         let latent = latent(network, &mut Stream::new(seed, &[SHOWN_LATENTS, code]));
-        let [finger1, finger2] = network.decode(&scene, &latent)?.fingers;
-        Ok(LatentMap { latent, finger1, finger2, executed: None })
+        let map = network.decode(&scene, &latent)?;
+        let peaks = map.peaks(&seen.points, model.peak_radius as f32, span.map(|width| width as f32)).points;
+        let [finger1, finger2] = map.fingers;
+        Ok(LatentMap { latent, finger1, finger2, peaks, executed: None })
     };
     (0..codes).map(map).collect()
-}
-
-impl LatentMap {
-    /// The most probable point of each finger; the first of equal ones.
-    pub(crate) fn peaks(&self) -> [usize; 2] {
-        ContactMap { fingers: [self.finger1.clone(), self.finger2.clone()] }.peaks()
-    }
 }
 
 impl ContactMapFigure {

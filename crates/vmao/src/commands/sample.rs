@@ -77,7 +77,8 @@ pub(super) fn run(arguments: &SampleArguments, session: &Session) -> Result<(), 
         let model = evaluation.model(method).context("the model is in the table")?;
         let part = usize::from(seen.contact.part.0);
         let codes = if model.networks[part].latent_size() == 0 { 1 } else { arguments.samples };
-        let sampled = latent_maps(model, part, &seen.observation, session.info.seed, codes)?;
+        let span = evaluation.scene(index).robots[usize::from(seen.arm.0)].gripper.span();
+        let sampled = latent_maps(model, part, &seen.observation, span, session.info.seed, codes)?;
         for (number, map) in sampled.iter().enumerate() {
             let path = maps.join(format!("scene-{index}-grasp-{}-code-{number}.ply", arguments.grasp));
             write_whole(&path, |file| ply(file, &seen.observation, map)).with_context(|| path.display().to_string())?;

@@ -108,9 +108,10 @@ fn lifted_scene(
     let part = usize::from(second.contact.part.0);
     // Both orders meet the same start and goal; in parallel order the second hand comes while the object lies.
     let before = evaluation.trial_by(model, GraspOrder::Parallel, index, Recording::Off).record;
-    let solids = &evaluation.scene(index).object.parts[part].solids;
+    let scene = evaluation.scene(index);
+    let (solids, span) = (&scene.object.parts[part].solids, scene.robots[usize::from(second.arm.0)].gripper.span());
     let state = |seen: &Observation, world_from_part: &Pose, grasp: Option<&GraspRecord>| {
-        let maps = latent_maps(model, part, seen, seed, codes)?;
+        let maps = latent_maps(model, part, seen, span, seed, codes)?;
         let surfaces = Surfaces::new(seen, part, solids, world_from_part);
         let measures = measures(seen, &maps, &surfaces, grasp);
         Ok::<State, Failure>(State { seen: seen.clone(), maps, measures })
@@ -173,7 +174,7 @@ fn measures(
     let mean = |values: Vec<f64>| (!values.is_empty()).then(|| values.iter().sum::<f64>() / values.len() as f64);
     let mass = |side: usize| mean(maps.iter().filter_map(|map| surfaces.shares(map)).map(|shares| shares[side]).collect());
     let height = |map: &LatentMap| {
-        let [first, second] = map.peaks().map(|point| Vector3::from(seen.points[point]).map(f64::from));
+        let [first, second] = map.peaks.map(|point| Vector3::from(seen.points[point]).map(f64::from));
         (second - first).try_normalize(1e-9).map(|axis| axis.z.abs())
     };
     let heights: Vec<f64> = maps.iter().filter_map(height).collect();
@@ -249,7 +250,9 @@ mod tests {
     }
 
     fn map(finger1: [f32; 4], finger2: [f32; 4]) -> LatentMap {
-        LatentMap { finger1: finger1.to_vec(), finger2: finger2.to_vec(), ..LatentMap::default() }
+        let peak = |channel: [f32; 4]| (0..4).max_by(|&a, &b| channel[a].total_cmp(&channel[b])).unwrap();
+        let peaks = [peak(finger1), peak(finger2)];
+        LatentMap { finger1: finger1.to_vec(), finger2: finger2.to_vec(), peaks, ..LatentMap::default() }
     }
 
     #[test]

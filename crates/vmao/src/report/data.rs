@@ -101,7 +101,9 @@ pub struct LatentMap {
     /// Probability of each point for finger 2.
     #[serde(serialize_with = "pack::floats")]
     pub finger2: Vec<f32>,
-    /// The trial in which the map's most probable points were grasped, if it was run.
+    /// The points about which most probability lies, of those that the gripper spans: finger 1's and finger 2's.
+    pub peaks: [usize; 2],
+    /// The trial in which these points were grasped, if it was run.
     pub executed: Option<RolloutFigure>,
 }
 

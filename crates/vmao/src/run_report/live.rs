@@ -68,9 +68,10 @@ fn scene(
     let seen = evaluation.trial_by(model, order, index, Recording::Off);
     let Some(grasp) = seen.record.grasps.get(GRASP) else { return Ok(None) };
     let part = usize::from(grasp.contact.part.0);
-    let mut maps = latent_maps(model, part, &grasp.observation, seed, CODES)?;
+    let span = evaluation.scene(index).robots[usize::from(grasp.arm.0)].gripper.span();
+    let mut maps = latent_maps(model, part, &grasp.observation, span, seed, CODES)?;
     let executed = maps.par_iter().enumerate().map(|(code, map)| {
-        let points = map.peaks().map(|point| Point3::from(grasp.observation.points[point].map(f64::from)));
+        let points = map.peaks.map(|point| Point3::from(grasp.observation.points[point].map(f64::from)));
         let trial = evaluation.trial_by(&WithPoints { model, points }, order, index, Recording::On);
         figure(code, trial)
     });

@@ -117,7 +117,9 @@ fn contact_maps() -> ContactMapFigure {
             };
             let (finger1, finger2) = (channel(1.0), channel(-1.0));
             let executed = Some(figure_of(&format!("Code {}: success", code + 1), None, code > 2));
-            LatentMap { latent: (0..16).map(|_| stream.normal() as f32).collect(), finger1, finger2, executed }
+            let peak = |channel: &[f32]| (0..channel.len()).max_by(|&a, &b| channel[a].total_cmp(&channel[b])).unwrap_or(0);
+            let peaks = [peak(&finger1), peak(&finger2)];
+            LatentMap { latent: (0..16).map(|_| stream.normal() as f32).collect(), finger1, finger2, peaks, executed }
         })
         .collect();
     figure
