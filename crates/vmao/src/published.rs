@@ -34,8 +34,10 @@ fn percent(successes: u64, trials: u64) -> String {
 /// Scales of all thresholds together at which successes are counted again, so that no threshold flatters.
 const SCALES: [f64; 6] = [0.05, 0.1, 0.25, 0.5, 1.0, 2.0];
 
-/// The results of a run as Markdown tables: rates with Wilson 95 % intervals, the paper's, McNemar against Top-1,
-/// failures by stage, simulated seconds of a trial (`timestep` in s); then rates with all thresholds scaled.
+/// The results of a run as Markdown tables; `timestep` is the simulator's (s).
+///
+/// First rates with Wilson 95 % intervals, the paper's, McNemar against Top-1, failures by stage, simulated seconds of a
+/// trial; then rates with all thresholds scaled.
 pub fn markdown(results: &Results, lines: &[TrialLine], timestep: f64) -> String {
     let stages = FailureStage::ALL.map(FailureStage::name).join(" | ");
     let mut text = format!(
