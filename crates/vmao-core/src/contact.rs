@@ -50,55 +50,51 @@ impl ContactMap {
     pub fn masses(&self, points: &[[f32; 3]], radius: f32) -> [Vec<f32>; 2] {
         self.fingers.each_ref().map(|channel| {
             let least = LEAST_PEAK * channel.iter().copied().fold(0.0, f32::max);
-            let near = |x: &[f32; 3], y: &[f32; 3]| {
-                let squared = (0..3).map(|axis| (x[axis] - y[axis]) * (x[axis] - y[axis])).sum::<f32>();
-                (1.0 - squared / (radius * radius)).max(0.0)
-            };
-            let about = |x: &[f32; 3]| channel.iter().zip(points).map(|(p, y)| p * near(x, y)).sum();
-            channel.iter().zip(points).map(|(&p, x)| if p >= least { about(x) } else { 0.0 }).collect()
+            channel.iter().zip(points).map(|(&p, x)| if p >= least { about(channel, points, x, radius) } else { 0.0 }).collect()
         })
+    }
+
+    /// The product of the probabilities about the two points of a pair, mᵢ of [`Self::masses`] without its lower bound.
+    pub fn pair_mass(&self, [first, second]: [usize; 2], points: &[[f32; 3]], radius: f32) -> f32 {
+        about(&self.fingers[0], points, &points[first], radius) * about(&self.fingers[1], points, &points[second], radius)
     }
 
     /// The pair of points, one for each finger, with the largest product of [`Self::masses`] among those that the gripper spans:
     /// `span` are its least and its largest distance between fingers (m). Ties go to the lower indices.
     ///
     /// If it spans no pair, the largest of each finger.
-    pub fn peaks(&self, points: &[[f32; 3]], radius: f32, span: [f32; 2]) -> Peaks {
+    pub fn peaks(&self, points: &[[f32; 3]], radius: f32, span: [f32; 2]) -> [usize; 2] {
         let masses = self.masses(points, radius);
         let [first, second] = masses.each_ref().map(|masses| ranked(masses));
         let spanned = |a: usize, b: usize| {
             let squared = (0..3).map(|axis| (points[a][axis] - points[b][axis]).powi(2)).sum::<f32>();
             (span[0]..=span[1]).contains(&squared.sqrt())
         };
-        let mut best: Option<Peaks> = None;
+        let mut best: Option<(f32, [usize; 2])> = None;
         for &a in &first {
             // Both lists fall, so that what follows the first spanned or lesser product is no better.
             for &b in &second {
                 let mass = masses[0][a] * masses[1][b];
-                if best.as_ref().is_some_and(|best| mass <= best.mass) {
+                if best.is_some_and(|(most, _)| mass <= most) {
                     break;
                 }
                 if spanned(a, b) {
-                    best = Some(Peaks { points: [a, b], mass });
+                    best = Some((mass, [a, b]));
                     break;
                 }
             }
         }
-        best.unwrap_or_else(|| {
-            let points = [first, second].map(|ranked| ranked.first().copied().unwrap_or(0));
-            let mass = points.iter().zip(&masses).map(|(&point, masses)| masses.get(point).copied().unwrap_or(0.0)).product();
-            Peaks { points, mass }
-        })
+        best.map_or_else(|| [first, second].map(|ranked| ranked.first().copied().unwrap_or(0)), |(_, pair)| pair)
     }
 }
 
-/// The peaks of a map's two fingers.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Peaks {
-    /// Indices of cloud points, of finger 1 and finger 2.
-    pub points: [usize; 2],
-    /// The product of the probabilities about them.
-    pub mass: f32,
+/// Σⱼ pⱼ max(0, 1 − ‖x − xⱼ‖²/r²).
+fn about(channel: &[f32], points: &[[f32; 3]], x: &[f32; 3], radius: f32) -> f32 {
+    let near = |y: &[f32; 3]| {
+        let squared = (0..3).map(|axis| (x[axis] - y[axis]) * (x[axis] - y[axis])).sum::<f32>();
+        (1.0 - squared / (radius * radius)).max(0.0)
+    };
+    channel.iter().zip(points).map(|(p, y)| p * near(y)).sum()
 }
 
 /// The indices of the values above zero, largest first, the lower index of equals first.
@@ -125,11 +121,11 @@ mod tests {
         let single = ranked(&channel)[0];
         assert!(points[single][0] > 0.045, "the most probable single point stands for more surface");
         let map = ContactMap { fingers: [channel.clone(), channel] };
-        for peak in map.peaks(&points, 0.012, [0.0, 1.0]).points {
+        for peak in map.peaks(&points, 0.012, [0.0, 1.0]) {
             assert!((points[peak][0] - 0.03).abs() < 0.002, "{}", points[peak][0]);
         }
         // Within a radius smaller than all distances each point stands for itself.
-        assert_eq!(map.peaks(&points, 1e-5, [0.0, 1.0]).points, [single; 2]);
+        assert_eq!(map.peaks(&points, 1e-5, [0.0, 1.0]), [single; 2]);
     }
 
     #[test]
@@ -140,7 +136,8 @@ mod tests {
         let expected = [0.5 + 0.75 * 0.3, 0.3 + 0.75 * 0.5, 0.2];
         assert!(first.iter().zip(expected).all(|(m, e)| (m - e).abs() < 1e-6), "{first:?}");
         assert_eq!((second[0], second[1]), (0.0, 0.0));
-        assert_eq!(map.peaks(&points, 0.01, [0.0, 1.0]).points, [0, 2]);
+        assert_eq!(map.peaks(&points, 0.01, [0.0, 1.0]), [0, 2]);
+        assert!((map.pair_mass([0, 1], &points, 0.01) - expected[0] * 0.05).abs() < 1e-6);
     }
 
     #[test]
@@ -149,7 +146,7 @@ mod tests {
         let map = ContactMap { fingers: [vec![0.4, 0.3, 0.2, 0.1], vec![0.41, 0.1, 0.19, 0.3]] };
         let peaks = |span| map.peaks(&points, 1e-3, span);
         // In one place, then 3 cm apart, then the widest; and all pairs by brute force.
-        assert_eq!((peaks([0.0, 1.0]).points, peaks([0.005, 0.05]).points, peaks([0.07, 0.08]).points), ([0, 0], [1, 0], [0, 3]));
+        assert_eq!((peaks([0.0, 1.0]), peaks([0.005, 0.05]), peaks([0.07, 0.08])), ([0, 0], [1, 0], [0, 3]));
         for span in [[0.0, 0.02], [0.015, 0.025], [0.03, 0.06], [0.05, 0.2]] {
             let spans = |(a, b): &(usize, usize)| {
                 let distance: f32 = points[*a][0] - points[*b][0];
@@ -157,9 +154,10 @@ mod tests {
             };
             let product = |(a, b): (usize, usize)| map.fingers[0][a] * map.fingers[1][b];
             let best = (0..16).map(|k| (k / 4, k % 4)).filter(spans).map(product).fold(0.0, f32::max);
-            assert_eq!(peaks(span).mass, best, "{span:?}");
+            let [a, b] = peaks(span);
+            assert_eq!(product((a, b)), best, "{span:?}");
         }
         // No pair is so far apart: each finger for itself.
-        assert_eq!(peaks([0.1, 0.2]).points, [0, 0]);
+        assert_eq!(peaks([0.1, 0.2]), [0, 0]);
     }
 }

@@ -80,7 +80,9 @@ pub fn squared(fingers: &[Point3<f64>; 2], points: &[Point3<f64>], limit: f64) -
     let square = square.try_normalize(1e-6)?;
     let slice = |offset: &&Vector3<f64>| offset.dot(&bar).abs() < SLICE && (*offset - bar * offset.dot(&bar)).norm() < reach;
     let slice: Vec<Vector3<f64>> = near.iter().filter(slice).copied().collect();
-    let (direction, [low, high]) = narrowest(&slice, &Unit::new_unchecked(bar), square)?;
+    // Where too little is seen of the cross-section, the contacts alone say how wide it is.
+    let half = along.dot(&square).abs() / 2.0;
+    let (direction, [low, high]) = narrowest(&slice, &Unit::new_unchecked(bar), square).unwrap_or((square, [-half, half]));
     // Either way round is the same grasp.
     if direction.dot(&along).abs() < along.norm() * limit.cos() {
         return None;
@@ -104,7 +106,12 @@ fn direction_of_bar(near: &[Vector3<f64>]) -> Option<Vector3<f64>> {
 }
 
 /// The direction about `bar` near `start` in which these offsets (m) reach least far, and from where to where they reach in it.
+///
+/// None if they are few.
 fn narrowest(slice: &[Vector3<f64>], bar: &Unit<Vector3<f64>>, start: Vector3<f64>) -> Option<(Vector3<f64>, [f64; 2])> {
+    if slice.len() < FEWEST_BAR_POINTS {
+        return None;
+    }
     let most = (MOST_TURN / TURN_STEP).round() as i32;
     let turned = (-most..=most).map(|step| {
         let angle = f64::from(step) * TURN_STEP;
@@ -113,8 +120,7 @@ fn narrowest(slice: &[Vector3<f64>], bar: &Unit<Vector3<f64>>, start: Vector3<f6
         let [low, high] = places.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], x| [low.min(x), high.max(x)]);
         (high - low + TURN_COST * angle.abs(), direction, [low, high])
     });
-    let least = turned.min_by(|a, b| a.0.total_cmp(&b.0))?;
-    (slice.len() >= FEWEST_BAR_POINTS).then_some((least.1, least.2))
+    turned.min_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, direction, reach)| (direction, reach))
 }
 
 /// Cloud points within this distance of the contacts' middle show the bar's direction (m) ...
@@ -202,6 +208,10 @@ mod tests {
         let [first, second] = square.map(|point| turn.inverse() * (roll.inverse() * point));
         assert!((first.y - 0.008).abs() < 1e-3 && (second.y + 0.008).abs() < 1e-3, "{first} {second}");
         assert!((first.z - second.z).abs() < 0.6e-3, "{first} {second}");
+        // Of the same bar only one end is seen: square and level, as wide as the contacts.
+        let end: Vec<Point3<f64>> = bar.iter().filter(|p| (turn.inverse() * *p).x > 0.016).copied().collect();
+        let few = squared(&askew, &end, 1.4).unwrap().map(|point| turn.inverse() * point);
+        assert!((few[0].y - few[1].y - 0.016).abs() < 1e-3 && (few[0].z - few[1].z).abs() < 1e-9, "{few:?}");
         // Both fingers' points on one side, one behind the other: across the bar where they are.
         let one_side = [Point3::new(0.01, 0.008, 0.01), Point3::new(-0.01, 0.007, 0.01)].map(|point| turn * point);
         let square = squared(&one_side, &bar, std::f64::consts::FRAC_PI_2).unwrap().map(|point| turn.inverse() * point);

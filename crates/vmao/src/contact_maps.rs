@@ -26,7 +26,7 @@ pub(crate) fn latent_maps(
     let map = |code| {
         let latent = latent(network, &mut Stream::new(seed, &[SHOWN_LATENTS, code]));
         let map = network.decode(&scene, &latent)?;
-        let peaks = map.peaks(&seen.points, model.peak_radius as f32, span.map(|width| width as f32)).points;
+        let peaks = map.peaks(&seen.points, model.peak_radius as f32, span.map(|width| width as f32));
         let [finger1, finger2] = map.fingers;
         Ok(LatentMap { latent, finger1, finger2, peaks, executed: None })
     };

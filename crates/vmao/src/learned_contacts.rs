@@ -56,27 +56,23 @@ pub fn drawn_points(map: &ContactMap, stream: &mut Stream) -> [usize; 2] {
     [0, 1].map(|finger| stream.weighted(&map.fingers[finger].iter().map(|&p| f64::from(p)).collect::<Vec<f64>>()))
 }
 
-/// The different pairs among these, those of the largest weights first.
-fn ranked(pairs: impl Iterator<Item = (f32, [usize; 2])>) -> Vec<[usize; 2]> {
+/// The different pairs of points on the cloud `points` (m), those first about which all maps together have most probability: Σₖ m₁ₐ⁽ᵏ⁾ m₂ᵦ⁽ᵏ⁾.
+///
+/// That is the model's own probability of the pair, the code integrated out, up to a factor.
+fn ranked(pairs: impl IntoIterator<Item = [usize; 2]>, maps: &[ContactMap], points: &[[f32; 3]], radius: f32) -> Vec<[usize; 2]> {
     let mut ranked: Vec<(f32, [usize; 2])> = Vec::new();
-    for (probability, pair) in pairs {
+    for pair in pairs {
         if ranked.iter().all(|(_, other)| *other != pair) {
-            ranked.push((probability, pair));
+            ranked.push((maps.iter().map(|map| map.pair_mass(pair, points, radius)).sum(), pair));
         }
     }
     ranked.sort_by(|a, b| b.0.total_cmp(&a.0));
     ranked.into_iter().map(|(_, pair)| pair).collect()
 }
 
-/// A map's peaks with the product of the probabilities about them.
-fn weighed_peaks(map: &ContactMap, points: &[[f32; 3]], radius: f32, span: [f32; 2]) -> (f32, [usize; 2]) {
-    let peaks = map.peaks(points, radius, span);
-    (peaks.mass, peaks.points)
-}
-
-/// The different peaks of these maps on the cloud `points` (m), those with most probability about them first.
+/// The different peaks of these maps, the pairs that are most probable over all maps first; lengths in m.
 pub fn ranked_peaks(maps: &[ContactMap], points: &[[f32; 3]], radius: f32, span: [f32; 2]) -> Vec<[usize; 2]> {
-    ranked(maps.iter().map(|map| weighed_peaks(map, points, radius, span)))
+    ranked(maps.iter().map(|map| map.peaks(points, radius, span)), maps, points, radius)
 }
 
 impl ContactModel for LearnedContacts {
@@ -87,19 +83,18 @@ impl ContactModel for LearnedContacts {
         let seen = query.observation;
         // A cloud too small for the network is a scene in which it sees nowhere to touch.
         let Ok(scene) = network.encode(&seen.points, &seen.colors) else { return Vec::new() };
-        let mut pairs = Vec::with_capacity(self.samples);
-        for _ in 0..self.samples {
-            let Ok(map) = network.decode(&scene, &latent(network, stream)) else { continue };
-            pairs.push(match self.draw {
-                Draw::Peak => weighed_peaks(&map, &seen.points, self.peak_radius as f32, query.span.map(|width| width as f32)),
-                Draw::Sample => {
-                    let pair = drawn_points(&map, stream);
-                    (map.fingers[0][pair[0]] * map.fingers[1][pair[1]], pair)
-                }
-            });
-        }
+        let maps: Vec<ContactMap> =
+            (0..self.samples).filter_map(|_| network.decode(&scene, &latent(network, stream)).ok()).collect();
+        let (points, radius, span) = (&seen.points, self.peak_radius as f32, query.span.map(|width| width as f32));
+        let pairs = match self.draw {
+            Draw::Peak => ranked_peaks(&maps, points, radius, span),
+            Draw::Sample => {
+                let drawn: Vec<[usize; 2]> = maps.iter().map(|map| drawn_points(map, stream)).collect();
+                ranked(drawn, &maps, points, radius)
+            }
+        };
         let place = |index: usize| Point3::from(seen.points[index].map(f64::from));
-        ranked(pairs.into_iter()).into_iter().map(|pair| pair.map(place)).collect()
+        pairs.into_iter().map(|pair| pair.map(place)).collect()
     }
 }
 
@@ -121,15 +116,16 @@ mod tests {
     }
 
     #[test]
-    fn ranking_drops_repeats_and_puts_the_most_probable_first() {
+    fn ranking_drops_repeats_and_puts_first_what_most_codes_agree_on() {
         let map = |p: f32, peak: usize| {
             let channel: Vec<f32> = (0..3).map(|i| if i == peak { p } else { (1.0 - p) / 2.0 }).collect();
             ContactMap { fingers: [channel.clone(), channel] }
         };
         let points = [[0.0; 3], [1.0, 0.0, 0.0], [2.0, 0.0, 0.0]];
-        assert_eq!(
-            ranked_peaks(&[map(0.5, 0), map(0.9, 2), map(0.6, 0), map(0.7, 1)], &points, 0.01, [0.0, 1.0]),
-            [[2, 2], [1, 1], [0, 0]]
-        );
+        // One sharp map against two that agree: 0.5² + 0.5² + 0.1² and 2 · 0.25² + 0.8² are 0.51 and 0.765; 3 · 0.25² more decide.
+        let maps = [map(0.5, 0), map(0.8, 2), map(0.5, 0)];
+        assert_eq!(ranked_peaks(&maps, &points, 0.01, [0.0, 1.0]), [[2, 2], [0, 0]]);
+        let maps = [map(0.6, 0), map(0.8, 2), map(0.6, 0), map(0.4, 1)];
+        assert_eq!(ranked_peaks(&maps, &points, 0.01, [0.0, 1.0]), [[0, 0], [2, 2], [1, 1]]);
     }
 }

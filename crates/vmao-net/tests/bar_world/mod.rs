@@ -105,7 +105,7 @@ impl Scene {
     }
 
     pub(crate) fn peaks(&self, map: &ContactMap) -> Peaks {
-        let at = map.peaks(&self.example.points, 0.012, [0.0, 1.0]).points.map(|i| self.in_bar(self.example.points[i]));
+        let at = map.peaks(&self.example.points, 0.012, [0.0, 1.0]).map(|i| self.in_bar(self.example.points[i]));
         let error = |p: [f64; 3], side: f64| {
             let along = ((p[0].abs() - MODE).abs() - SPREAD).max(0.0);
             let across = p[1] - side * BAR[1];

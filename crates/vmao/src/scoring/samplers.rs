@@ -82,7 +82,7 @@ pub fn pairs(
 ) -> Vec<[usize; 2]> {
     let (radius, span) = (rules.radius as f32, rules.span.map(|width| width as f32));
     match sampler {
-        Sampler::VmaoPeak => maps.iter().take(count).map(|map| map.peaks(points, radius, span).points).collect(),
+        Sampler::VmaoPeak => maps.iter().take(count).map(|map| map.peaks(points, radius, span)).collect(),
         Sampler::VmaoDraw => {
             maps.iter().take(count).enumerate().map(|(code, map)| drawn_points(map, &mut streams(code))).collect()
         }
