@@ -58,8 +58,8 @@ pub fn gripper_poses(fingers: &[Point3<f64>; 2], count: usize) -> Vec<GripperPos
 ///
 /// The bar's direction is the principal axis of the cloud `points` around the contacts' middle; flat is where the bar is
 /// narrowest between two pads, and level if all ways are alike. Pads that close askew turn the part or the hand until
-/// they lie flat; planning for the square grasp foresees it. `None` where the points nearby are not drawn out like a bar,
-/// or the axis would have to turn by more than `limit` (rad).
+/// they lie flat; planning for the square grasp foresees it. `None` where the points nearby are not drawn out like a bar, the
+/// contacts lie far beside it, or the axis would have to turn by more than `limit` (rad).
 pub fn squared(fingers: &[Point3<f64>; 2], points: &[Point3<f64>], limit: f64) -> Option<[Point3<f64>; 2]> {
     let middle = nalgebra::center(&fingers[0], &fingers[1]);
     let near: Vec<Vector3<f64>> =
@@ -67,8 +67,9 @@ pub fn squared(fingers: &[Point3<f64>; 2], points: &[Point3<f64>], limit: f64) -
     let bar = direction_of_bar(&near)?;
     let along = fingers[0] - fingers[1];
     let mut square = along - bar * bar.dot(&along);
+    let across_bar = square.norm();
     // Two points on one side of the bar say where along it, not how wide it is.
-    let reach = if square.norm() < ONE_SIDE { WIDEST_BAR } else { square.norm() / 2.0 + SLICE_MARGIN };
+    let reach = if across_bar < ONE_SIDE { WIDEST_BAR } else { across_bar / 2.0 + SLICE_MARGIN };
     let tilt = square.z.abs().atan2(square.xy().norm());
     // Level first, then square again within the level plane, unless the bar itself stands upright.
     if tilt < STEEP {
@@ -83,6 +84,10 @@ pub fn squared(fingers: &[Point3<f64>; 2], points: &[Point3<f64>], limit: f64) -
     // Where too little is seen of the cross-section, the contacts alone say how wide it is.
     let half = along.dot(&square).abs() / 2.0;
     let (direction, [low, high]) = narrowest(&slice, &Unit::new_unchecked(bar), square).unwrap_or((square, [-half, half]));
+    // Points far beside a bar are not on it.
+    if across_bar > high - low + 2.0 * SLICE_MARGIN {
+        return None;
+    }
     // Either way round is the same grasp.
     if direction.dot(&along).abs() < along.norm() * limit.cos() {
         return None;
@@ -208,10 +213,12 @@ mod tests {
         let [first, second] = square.map(|point| turn.inverse() * (roll.inverse() * point));
         assert!((first.y - 0.008).abs() < 1e-3 && (second.y + 0.008).abs() < 1e-3, "{first} {second}");
         assert!((first.z - second.z).abs() < 0.6e-3, "{first} {second}");
-        // Of the same bar only one end is seen: square and level, as wide as the contacts.
-        let end: Vec<Point3<f64>> = bar.iter().filter(|p| (turn.inverse() * *p).x > 0.016).copied().collect();
+        // Where the contacts are nothing is seen of the same bar: square and level, as wide as the contacts.
+        let end: Vec<Point3<f64>> = bar.iter().filter(|p| (turn.inverse() * *p).x.abs() > 0.014).copied().collect();
         let few = squared(&askew, &end, 1.4).unwrap().map(|point| turn.inverse() * point);
         assert!((few[0].y - few[1].y - 0.016).abs() < 1e-3 && (few[0].z - few[1].z).abs() < 1e-9, "{few:?}");
+        let beside = [Point3::new(0.0, 0.1, 0.01), Point3::new(0.0, -0.1, 0.01)].map(|point| turn * point);
+        assert_eq!(squared(&beside, &bar, 1.4), None, "points far beside the bar are not on it");
         // Both fingers' points on one side, one behind the other: across the bar where they are.
         let one_side = [Point3::new(0.01, 0.008, 0.01), Point3::new(-0.01, 0.007, 0.01)].map(|point| turn * point);
         let square = squared(&one_side, &bar, std::f64::consts::FRAC_PI_2).unwrap().map(|point| turn.inverse() * point);
