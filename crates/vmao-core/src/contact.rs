@@ -66,10 +66,7 @@ impl ContactMap {
     pub fn peaks(&self, points: &[[f32; 3]], radius: f32, span: [f32; 2]) -> [usize; 2] {
         let masses = self.masses(points, radius);
         let [first, second] = masses.each_ref().map(|masses| ranked(masses));
-        let spanned = |a: usize, b: usize| {
-            let squared = (0..3).map(|axis| (points[a][axis] - points[b][axis]).powi(2)).sum::<f32>();
-            (span[0]..=span[1]).contains(&squared.sqrt())
-        };
+        let spanned = |a: usize, b: usize| (span[0]..=span[1]).contains(&squared_distance(&points[a], &points[b]).sqrt());
         let mut best: Option<(f32, [usize; 2])> = None;
         for &a in &first {
             // Both lists fall, so that what follows the first spanned or lesser product is no better.
@@ -90,11 +87,12 @@ impl ContactMap {
 
 /// Σⱼ pⱼ max(0, 1 − ‖x − xⱼ‖²/r²).
 fn about(channel: &[f32], points: &[[f32; 3]], x: &[f32; 3], radius: f32) -> f32 {
-    let near = |y: &[f32; 3]| {
-        let squared = (0..3).map(|axis| (x[axis] - y[axis]) * (x[axis] - y[axis])).sum::<f32>();
-        (1.0 - squared / (radius * radius)).max(0.0)
-    };
+    let near = |y: &[f32; 3]| (1.0 - squared_distance(x, y) / (radius * radius)).max(0.0);
     channel.iter().zip(points).map(|(p, y)| p * near(y)).sum()
+}
+
+fn squared_distance(x: &[f32; 3], y: &[f32; 3]) -> f32 {
+    (0..3).map(|axis| (x[axis] - y[axis]) * (x[axis] - y[axis])).sum()
 }
 
 /// The indices of the values above zero, largest first, the lower index of equals first.

@@ -69,4 +69,12 @@ impl TrialOutcome {
     pub fn is_success(self) -> bool {
         self == Self::Success
     }
+
+    /// `success`, or the name of the stage at which it failed.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Success => "success",
+            Self::Failed(stage) => stage.name(),
+        }
+    }
 }

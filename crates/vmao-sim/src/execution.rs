@@ -170,7 +170,7 @@ impl Simulation<'_> {
         let mut lost = vec![0; held.len()];
         let part_from_tools = self.part_from_tools(held);
         let mut grips = part_from_tools.clone();
-        let accepted = (self.scene.timestep / motion.grip_memory.max(self.scene.timestep)).min(1.0);
+        let accepted = self.scene.timestep / motion.grip_memory.max(self.scene.timestep);
         for tick in 1..=ticks {
             let time = tick as f64 * self.scene.timestep;
             let next = trajectory.part_poses_at(time);

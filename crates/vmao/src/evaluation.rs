@@ -4,6 +4,7 @@ use crate::config::Config;
 use crate::failure::Failure;
 use crate::kept_trials::KeptTrials;
 use crate::learned_contacts::LearnedContacts;
+use crate::learning::load_methods;
 use crate::output::{progress_bar, write_whole};
 use crate::provenance::RunInfo;
 use crate::results::{Cell, Method, Results};
@@ -67,6 +68,11 @@ impl<'a> Evaluation<'a> {
         let mut stream = Stream::new(run_seed, &[EVALUATION]);
         let seed = u64::from(stream.bits()) << 32 | u64::from(stream.bits());
         Ok(Self { config, scenes: scenes(config, config.evaluate.instances)?, seed, methods })
+    }
+
+    /// The table of a run directory, for the networks that it holds; `config` and `run_seed` are those it was made with.
+    pub fn of_run(run: &Path, config: &'a Config, run_seed: u64) -> Result<Self, Failure> {
+        Self::new(config, run_seed, load_methods(&run.join("models"), config)?)
     }
 
     /// The models of `method`, if they are here.

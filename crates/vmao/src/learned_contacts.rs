@@ -122,9 +122,10 @@ mod tests {
             ContactMap { fingers: [channel.clone(), channel] }
         };
         let points = [[0.0; 3], [1.0, 0.0, 0.0], [2.0, 0.0, 0.0]];
-        // One sharp map against two that agree: 0.5² + 0.5² + 0.1² and 2 · 0.25² + 0.8² are 0.51 and 0.765; 3 · 0.25² more decide.
+        // One sharp map against two that agree: 2 · 0.5² + 0.1² = 0.51 about point 0, 2 · 0.25² + 0.8² = 0.765 about point 2.
         let maps = [map(0.5, 0), map(0.8, 2), map(0.5, 0)];
         assert_eq!(ranked_peaks(&maps, &points, 0.01, [0.0, 1.0]), [[2, 2], [0, 0]]);
+        // Now 2 · 0.6² + 0.1² + 0.3² = 0.82 about point 0, 2 · 0.2² + 0.8² + 0.3² = 0.81 about point 2.
         let maps = [map(0.6, 0), map(0.8, 2), map(0.6, 0), map(0.4, 1)];
         assert_eq!(ranked_peaks(&maps, &points, 0.01, [0.0, 1.0]), [[0, 0], [2, 2], [1, 1]]);
     }

@@ -5,7 +5,7 @@ use crate::dataset::{self, digest, stored};
 use crate::evaluation::{Evaluation, TrialLine};
 use crate::exploration::Explorer;
 use crate::failure::{Failure, OrBadInput};
-use crate::learning::{json_lines, load_methods};
+use crate::learning::json_lines;
 use crate::provenance::RunInfo;
 use crate::scenes::scenes;
 use nalgebra::Point3;
@@ -197,7 +197,7 @@ fn verify_evaluation(
     chosen: &[&TrialLine],
     verified: &mut Verified,
 ) -> Result<(), Failure> {
-    let evaluation = Evaluation::new(config, info.seed, load_methods(&run.join("models"), config)?)?;
+    let evaluation = Evaluation::of_run(run, config, info.seed)?;
     for line in chosen {
         let what =
             format!("{}: {} {} trial {}", run.join("trials.jsonl").display(), line.method.name(), line.order.name(), line.index);

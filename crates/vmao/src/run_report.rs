@@ -8,7 +8,7 @@ use crate::dataset;
 use crate::evaluation::{Evaluation, TrialLine};
 use crate::failure::{Failure, OrBadInput};
 use crate::json::Document;
-use crate::learning::{json_lines, load_methods};
+use crate::learning::json_lines;
 use crate::output::write_whole;
 use crate::provenance::RunInfo;
 use crate::report::{
@@ -32,7 +32,7 @@ pub fn write_report(directory: &Path) -> Result<PathBuf, Failure> {
     let results: Results = Document::read(&directory.join("results.json")).or_bad_input()?.parse().or_bad_input()?;
     let lines: Vec<TrialLine> = json_lines(&directory.join("trials.jsonl"))?;
     let models = directory.join("models");
-    let evaluation = Evaluation::new(&config, info.seed, load_methods(&models, &config)?)?;
+    let evaluation = Evaluation::of_run(directory, &config, info.seed)?;
     let (exploration, digest) = explored(&config, &directory.join("data"))?;
     let motions = rollouts::motions(&evaluation, &StoredRollouts::of(directory), &lines)?;
     let data = ReportData {

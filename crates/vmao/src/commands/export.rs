@@ -5,7 +5,7 @@ use crate::{
     config::Config,
     evaluation::{Evaluation, TrialLine},
     failure::{Failure, OrBadInput},
-    learning::{json_lines, load_methods},
+    learning::json_lines,
     output::{progress_bar, write_whole},
     picture::{Animation, Layer, encode},
     provenance::RunInfo,
@@ -18,7 +18,7 @@ use std::{
     fs, io,
     path::{Path, PathBuf},
 };
-use vmao_core::{order::GraspOrder, outcome::TrialOutcome, rollout::Rollout};
+use vmao_core::{order::GraspOrder, rollout::Rollout};
 use vmao_sim::Recording;
 
 /// The most pixels that an animation may have, over all its frames.
@@ -151,17 +151,13 @@ pub(super) fn motion(run: &Path, line: &TrialLine) -> Result<Rollout, Failure> {
     }
     let config = Config::load(Some(&run.join("config.toml")), &[]).or_bad_input()?;
     let info = RunInfo::load(run).or_bad_input()?;
-    let evaluation = Evaluation::new(&config, info.seed, load_methods(&run.join("models"), &config)?)?;
+    let evaluation = Evaluation::of_run(run, &config, info.seed)?;
     let again = evaluation.trial(line.order, line.method, line.index, Recording::On).with_context(|| {
         format!("{}: no networks of {}, expected those that the trial ran with", run.join("models").display(), line.method.name())
     });
     let again = again.or_bad_input()?;
     if again.record.outcome != line.outcome {
-        let named = |outcome: TrialOutcome| match outcome {
-            TrialOutcome::Success => "success",
-            TrialOutcome::Failed(stage) => stage.name(),
-        };
-        let (then, now) = (named(line.outcome), named(again.record.outcome));
+        let (then, now) = (line.outcome.name(), again.record.outcome.name());
         let place = run.join("trials.jsonl");
         return Err(Failure::Work(anyhow::anyhow!(
             "{}: trial {} ended with {then} and now with {now}",

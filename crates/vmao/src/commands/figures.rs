@@ -6,7 +6,7 @@ use crate::{
     evaluation::{Evaluation, TrialLine},
     failure::{Failure, OrBadInput},
     figures::{changes, key_frames, lifted_scenes, maps_picture, table},
-    learning::{json_lines, load_methods},
+    learning::json_lines,
     output::{Layout, print, progress_bar, write_whole},
     picture::save,
     provenance::RunInfo,
@@ -48,7 +48,7 @@ pub(super) fn run(arguments: &FiguresArguments, session: &Session) -> Result<(),
     let info = RunInfo::load(run).or_bad_input()?;
     let lines: Vec<TrialLine> = json_lines(&run.join("trials.jsonl"))?;
     let line = sequential(&lines, arguments.trial, &run.join("trials.jsonl"))?;
-    let evaluation = Evaluation::new(&config, info.seed, load_methods(&run.join("models"), &config)?)?;
+    let evaluation = Evaluation::of_run(run, &config, info.seed)?;
     let pool = session.pool()?;
     let bar = progress_bar("scenes", arguments.scenes);
     let asked = (arguments.scenes, arguments.codes);

@@ -93,20 +93,12 @@ pub(super) fn named_order(name: &str) -> Result<GraspOrder, String> {
     orders.into_iter().find(|&order| order_name(order) == name).ok_or_else(|| unknown("order", name, &orders.map(order_name)))
 }
 
-/// `success`, or the name of the stage that failed.
-pub(super) fn outcome_name(outcome: TrialOutcome) -> &'static str {
-    match outcome {
-        TrialOutcome::Success => "success",
-        TrialOutcome::Failed(stage) => stage.name(),
-    }
-}
-
 /// The outcome with this name, or the names there are.
 pub(super) fn named_outcome(name: &str) -> Result<TrialOutcome, String> {
     let failed = FailureStage::ALL.map(TrialOutcome::Failed);
     let mut outcomes = std::iter::once(TrialOutcome::Success).chain(failed);
-    let names: Vec<&str> = outcomes.clone().map(outcome_name).collect();
-    outcomes.find(|&outcome| outcome_name(outcome) == name).ok_or_else(|| unknown("outcome", name, &names))
+    let names: Vec<&str> = outcomes.clone().map(TrialOutcome::name).collect();
+    outcomes.find(|&outcome| outcome.name() == name).ok_or_else(|| unknown("outcome", name, &names))
 }
 
 fn unknown(kind: &str, name: &str, names: &[&str]) -> String {
@@ -133,7 +125,7 @@ mod tests {
     fn names_read_back_and_others_are_answered_with_what_exists() {
         for stage in FailureStage::ALL {
             let outcome = TrialOutcome::Failed(stage);
-            assert_eq!(named_outcome(outcome_name(outcome)), Ok(outcome));
+            assert_eq!(named_outcome(outcome.name()), Ok(outcome));
         }
         assert_eq!(named_order("sequential"), Ok(GraspOrder::Sequential));
         assert_eq!(

@@ -3,7 +3,7 @@
 //! Numbers are little-endian, lists and strings are preceded by their length as u64, poses are x y z qw qx qy qz.
 //! A failed trial counts without its observations, as it is stored.
 
-use super::columns::{label_code, order_name, outcome_name, pose_numbers};
+use super::columns::{label_code, order_name, pose_numbers};
 use crate::provenance::hex;
 use sha2::{Digest, Sha256};
 use vmao_core::{geometry::Pose, record::TrialRecord};
@@ -85,7 +85,7 @@ impl Canonical {
             self.0.update(number.to_le_bytes());
         }
         self.text(order_name(*order));
-        self.text(outcome_name(*outcome));
+        self.text(outcome.name());
         self.text(detail);
         self.numbers(final_errors);
         self.poses(&start.world_from_parts);

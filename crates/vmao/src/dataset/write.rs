@@ -1,9 +1,7 @@
 //! Records to Parquet.
 
 use super::{
-    columns::{
-        DIGEST_KEY, SCHEMA_KEY, SCHEMA_VERSION, element, grasp_fields, label_code, order_name, outcome_name, pose_numbers, schema,
-    },
+    columns::{DIGEST_KEY, SCHEMA_KEY, SCHEMA_VERSION, element, grasp_fields, label_code, order_name, pose_numbers, schema},
     digest::digest,
 };
 use arrow_array::{
@@ -51,7 +49,7 @@ fn batch(records: &[TrialRecord]) -> Result<RecordBatch, ArrowError> {
         Arc::new(UInt64Array::from_iter_values(records.iter().map(|record| record.index))),
         Arc::new(UInt64Array::from_iter_values(records.iter().map(|record| record.seed))),
         Arc::new(StringArray::from_iter_values(records.iter().map(|record| order_name(record.order)))),
-        Arc::new(StringArray::from_iter_values(records.iter().map(|record| outcome_name(record.outcome)))),
+        Arc::new(StringArray::from_iter_values(records.iter().map(|record| record.outcome.name()))),
         Arc::new(StringArray::from_iter_values(records.iter().map(|record| &record.detail))),
         Arc::new(UInt64Array::from_iter_values(records.iter().map(|record| record.steps))),
         doubles(records.iter().map(|record| record.final_errors.to_vec()))?,

@@ -26,7 +26,7 @@ pub(super) struct Motions {
 /// Collects the motions of the table's trials: those that the run keeps, and where it keeps none, some that are run again.
 pub(super) fn motions(evaluation: &Evaluation<'_>, stored: &StoredRollouts, lines: &[TrialLine]) -> Result<Motions, Failure> {
     let order = by_interest(lines);
-    let kept: Vec<Option<PackedRollout>> = lines.par_iter().map(|line| stored.read(line)).collect::<Result<_, Failure>>()?;
+    let mut kept: Vec<Option<PackedRollout>> = lines.par_iter().map(|line| stored.read(line)).collect::<Result<_, Failure>>()?;
     let missing: Vec<usize> = order.iter().copied().filter(|&line| kept[line].is_none()).take(RUN_AGAIN).collect();
     let bar = progress_bar("run again for the report", missing.len() as u64);
     let run = |&line: &usize| {
@@ -35,17 +35,17 @@ pub(super) fn motions(evaluation: &Evaluation<'_>, stored: &StoredRollouts, line
         bar.inc(1);
         Ok((line, rollout.map(|rollout| PackedRollout::pack(&rollout)).transpose()?))
     };
-    let run: BTreeMap<usize, Option<PackedRollout>> = missing.par_iter().map(run).collect::<Result<_, Failure>>()?;
+    let mut run: BTreeMap<usize, Option<PackedRollout>> = missing.par_iter().map(run).collect::<Result<_, Failure>>()?;
     bar.finish();
     let mut shown: BTreeMap<usize, PackedRollout> = BTreeMap::new();
     let mut bytes = 0;
     for line in order {
-        let Some(rollout) = kept[line].as_ref().or_else(|| run.get(&line)?.as_ref()) else { continue };
+        let Some(rollout) = kept[line].take().or_else(|| run.remove(&line)?) else { continue };
         bytes += rollout.bodies.len() + rollout.motion.len() + rollout.forces.len() + 120 * rollout.events.len();
         if bytes > BUDGET {
             break;
         }
-        shown.insert(line, rollout.clone());
+        shown.insert(line, rollout);
     }
     let places: Vec<usize> = shown.keys().copied().collect();
     let figures = shown.into_iter().map(|(line, rollout)| figure(&lines[line], rollout)).collect();
