@@ -56,8 +56,8 @@ pub fn gripper_poses(fingers: &[Point3<f64>; 2], count: usize) -> Vec<GripperPos
 
 /// The same contacts with the closing axis turned square to the bar they lie on and flat on its sides, about the bar's middle.
 ///
-/// The bar's direction is the principal axis of the cloud `points` around the contacts' middle; flat is where the bar is
-/// narrowest between two pads, and level if all ways are alike. Pads that close askew turn the part or the hand until
+/// The bar's direction is the principal axis of the cloud `points` around the contacts' middle; flat is
+/// along an edge of the rectangle that fits its cross-section best, and level if all ways are alike. Pads that close askew turn the part or the hand until
 /// they lie flat; planning for the square grasp foresees it. `None` where the points nearby are not drawn out like a bar, the
 /// contacts lie far beside it, or the axis would have to turn by more than `limit` (rad).
 pub fn squared(fingers: &[Point3<f64>; 2], points: &[Point3<f64>], limit: f64) -> Option<[Point3<f64>; 2]> {
@@ -83,7 +83,7 @@ pub fn squared(fingers: &[Point3<f64>; 2], points: &[Point3<f64>], limit: f64) -
     let slice: Vec<Vector3<f64>> = near.iter().filter(slice).copied().collect();
     // Where too little is seen of the cross-section, the contacts alone say how wide it is.
     let half = along.dot(&square).abs() / 2.0;
-    let (direction, [low, high]) = narrowest(&slice, &Unit::new_unchecked(bar), square).unwrap_or((square, [-half, half]));
+    let (direction, [low, high]) = flat(&slice, &Unit::new_unchecked(bar), square).unwrap_or((square, [-half, half]));
     // Points far beside a bar are not on it.
     if across_bar > high - low + 2.0 * SLICE_MARGIN {
         return None;
@@ -110,10 +110,11 @@ fn direction_of_bar(near: &[Vector3<f64>]) -> Option<Vector3<f64>> {
     drawn_out.then(|| eigen.eigenvectors.column(longest).into_owned())
 }
 
-/// The direction about `bar` near `start` in which these offsets (m) reach least far, and from where to where they reach in it.
+/// The direction about `bar` near `start` that is square to a side of the bar, and from where to where these offsets (m) reach in it.
 ///
-/// None if they are few.
-fn narrowest(slice: &[Vector3<f64>], bar: &Unit<Vector3<f64>>, start: Vector3<f64>) -> Option<(Vector3<f64>, [f64; 2])> {
+/// Of all rectangles about the cross-section that are just large enough, the one on whose edges the points lie best. The narrowest
+/// one, or the smallest, would be askew where two sides only are seen. None if they are few.
+fn flat(slice: &[Vector3<f64>], bar: &Unit<Vector3<f64>>, start: Vector3<f64>) -> Option<(Vector3<f64>, [f64; 2])> {
     if slice.len() < FEWEST_BAR_POINTS {
         return None;
     }
@@ -121,9 +122,18 @@ fn narrowest(slice: &[Vector3<f64>], bar: &Unit<Vector3<f64>>, start: Vector3<f6
     let turned = (-most..=most).map(|step| {
         let angle = f64::from(step) * TURN_STEP;
         let direction = Rotation3::from_axis_angle(bar, angle) * start;
-        let places = slice.iter().map(|offset| offset.dot(&direction));
-        let [low, high] = places.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], x| [low.min(x), high.max(x)]);
-        (high - low + TURN_COST * angle.abs(), direction, [low, high])
+        let sides = [direction, bar.cross(&direction)];
+        let reach = sides.map(|side| {
+            let places = slice.iter().map(|offset| offset.dot(&side));
+            places.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], x| [low.min(x), high.max(x)])
+        });
+        let from_edge = |offset: &Vector3<f64>| {
+            let distances =
+                sides.iter().zip(&reach).map(|(side, [low, high])| (offset.dot(side) - low).min(high - offset.dot(side)));
+            distances.fold(f64::INFINITY, f64::min)
+        };
+        let misfit = slice.iter().map(from_edge).sum::<f64>() / slice.len() as f64;
+        (misfit + TURN_COST * angle.abs(), direction, reach[0])
     });
     turned.min_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, direction, reach)| (direction, reach))
 }
@@ -210,6 +220,16 @@ mod tests {
         let one_on_top =
             [turn * Point3::new(0.0, 0.004, 0.018), turn * Point3::new(0.0, -0.008, 0.006)].map(|point| roll * point);
         let square = squared(&one_on_top, &tilted, 1.4).unwrap();
+        let [first, second] = square.map(|point| turn.inverse() * (roll.inverse() * point));
+        assert!((first.y - 0.008).abs() < 1e-3 && (second.y + 0.008).abs() < 1e-3, "{first} {second}");
+        assert!((first.z - second.z).abs() < 0.6e-3, "{first} {second}");
+        // Seen on top and on one side only: flat all the same, though the bar is narrower across the corner that is seen.
+        let corner: Vec<Point3<f64>> = (-30..=30)
+            .flat_map(|step| (0..=8).map(move |i| (f64::from(step) * 0.002, f64::from(i) * 0.002)))
+            .flat_map(|(x, along)| [Point3::new(x, 0.008, along + 0.002), Point3::new(x, 0.008 - along, 0.018)])
+            .map(|point| roll * (turn * point))
+            .collect();
+        let square = squared(&one_on_top, &corner, 1.4).unwrap();
         let [first, second] = square.map(|point| turn.inverse() * (roll.inverse() * point));
         assert!((first.y - 0.008).abs() < 1e-3 && (second.y + 0.008).abs() < 1e-3, "{first} {second}");
         assert!((first.z - second.z).abs() < 0.6e-3, "{first} {second}");

@@ -2,16 +2,15 @@
 
 use crate::assignment::assignments;
 use crate::cameras::observe;
-use crate::combinations::{Choices, Reserve, compatible_grasps, free_alone, joint_positions_with};
+use crate::combinations::{Choices, Reserve, compatible_grasps, free_alone};
 use crate::dependency_root::{choose_root, grasp_sequence, step_goal};
 use crate::failure::Failure;
 use crate::grasping::{Grasp, GraspConfig, object_cloud, reachable_grasps};
 use crate::measures::Measuring;
-use crate::planning_world::{Obstacles, collision_world};
 use crate::profile::{Stage, time};
 use crate::recorder::Recorder;
 use crate::scene::Scene;
-use crate::simulation::{Grip, Simulation};
+use crate::simulation::Simulation;
 use crate::targets::Targets;
 use crate::task::{GoalReach, draw_goal, goal_errors, sample_start};
 use crate::trial::{Recording, Trial, TrialConfig};
@@ -24,10 +23,8 @@ use vmao_core::object::{ObjectGoal, ObjectState};
 use vmao_core::object_graph::ObjectGraph;
 use vmao_core::order::GraspOrder;
 use vmao_core::outcome::{FailureStage, TrialOutcome};
-use vmao_core::planning::{PlanOutcome, PlanSettings, plan, time_path};
 use vmao_core::random::Stream;
 use vmao_core::record::{GraspRecord, TrialRecord};
-use vmao_core::time_parameterization::{MotionLimits, Trajectory};
 
 /// Random streams of a trial, each its own so that two methods meet the same scene and goal.
 #[derive(Clone, Copy)]
@@ -47,14 +44,6 @@ const FALL_SECONDS: f64 = 0.1;
 const REST_SPEED: f64 = 2e-3;
 /// Steps in which the motion after a later grasp is looked at.
 const RESERVE_WAYPOINTS: usize = 4;
-
-/// Joint trajectories to the stand-offs and from there to the grasps.
-pub(crate) struct Approach {
-    way: Trajectory,
-    last_stretch: Trajectory,
-    /// Where the parts were when it was planned: a part that hangs free may have moved since.
-    seen: Vec<Pose>,
-}
 
 /// A trial under way.
 pub(crate) struct Attempt<'a> {
@@ -209,6 +198,14 @@ impl<'a> Attempt<'a> {
         Ok(contacts)
     }
 
+    /// Forgets the contacts of grasps that were not made.
+    pub(crate) fn forget_contacts(&mut self) {
+        self.grasps.truncate(self.held.len());
+        if let Some(recorder) = &mut self.simulation.recorder {
+            recorder.rollout.contacts.truncate(self.held.len());
+        }
+    }
+
     /// Gripper poses for these contacts that all arms reach, carry to the step's goal, and take without meeting; best first.
     ///
     /// Arms are assigned to parts by distance; the other way round only if that leaves no way, now or for later grasps.
@@ -228,13 +225,13 @@ impl<'a> Attempt<'a> {
     }
 
     /// The combinations of grasps on these contacts that the arms can make if part p is taken by `arms[p]`.
-    fn choices(&self, arms: &[ArmId], contacts: &[FingerPoints], stream: &mut Stream) -> Result<Choices, Failure> {
+    pub(crate) fn choices(&self, arms: &[ArmId], contacts: &[FingerPoints], stream: &mut Stream) -> Result<Choices, Failure> {
         let (first, config) = (self.held.len(), &self.config.grasp);
-        let cloud = object_cloud(&self.grasps[first].observation);
         let holders = self.holders();
         let motion = self.waypoints(&self.trajectory(self.step_goal(first + contacts.len())));
         let mut candidates = Vec::new();
         for (&part, fingers) in self.sequence[first..].iter().zip(contacts) {
+            let cloud = self.cloud_on(part);
             candidates.push(self.within_reach((arms[usize::from(part.0)], part), (&cloud, fingers), &motion, stream)?);
         }
         let reserve = self.reserve(arms, first + contacts.len(), &motion, stream);
@@ -251,6 +248,16 @@ impl<'a> Attempt<'a> {
     ) -> Result<Vec<Grasp>, Failure> {
         let reached = reachable_grasps(&self.simulation, &self.config.grasp, (arm, part), touch, motion, stream)?;
         Ok(free_alone(&self.simulation, &self.config.grasp, &self.holders(), &motion[0], reached))
+    }
+
+    /// The object's points as they were seen for the grasp of `part`, moved with that part to where it is by now.
+    pub(crate) fn cloud_on(&self, part: PartId) -> Vec<Point3<f64>> {
+        let now = self.simulation.object_state().world_from_parts;
+        let here = |record: &GraspRecord| {
+            let by = now[usize::from(part.0)] * record.world_from_part.inverse();
+            object_cloud(&record.observation).iter().map(|point| by * point).collect()
+        };
+        self.grasps.iter().find(|record| record.contact.part == part).map(here).unwrap_or_default()
     }
 
     /// How the parts that are grasped from `next` on could be taken where the object is after `motion`: as demonstrated, on average.
@@ -296,78 +303,6 @@ impl<'a> Attempt<'a> {
         choices
     }
 
-    /// The first of these grasps that a collision-free motion of all its arms together leads to.
-    pub(crate) fn plan_approach(&mut self, choices: Vec<Vec<Grasp>>) -> Result<(Vec<Grasp>, Approach), Failure> {
-        let mut stream = self.stream(Draw::Plan);
-        let mut why = String::new();
-        for grasps in choices {
-            match time(Stage::Planning, || self.approach_to(&grasps, &mut stream)) {
-                Ok(approach) => return Ok((grasps, approach)),
-                Err(cause) => why = cause,
-            }
-        }
-        Err(Failure::new(FailureStage::NoPlan, why))
-    }
-
-    fn approach_to(&self, grasps: &[Grasp], stream: &mut Stream) -> Result<Approach, String> {
-        let mut openings: Vec<f64> = (0..self.scene.robots.len()).map(|arm| self.simulation.opening(arm)).collect();
-        for grasp in grasps {
-            openings[usize::from(grasp.arm.0)] = grasp.opening;
-        }
-        let chosen: Vec<&Grasp> = grasps.iter().collect();
-        let start = joint_positions_with(&self.simulation, &[], &|grasp| grasp.standoff().to_vec());
-        let standoff = joint_positions_with(&self.simulation, &chosen, &|grasp| grasp.standoff().to_vec());
-        let world = collision_world(&self.simulation, &openings, &Obstacles::Parts(&self.holders()));
-        let moving: Vec<usize> = grasps.iter().map(|grasp| usize::from(grasp.arm.0)).collect();
-        let frozen_arms = (0..self.scene.robots.len()).filter(|arm| !moving.contains(arm)).collect();
-        let settings =
-            PlanSettings { margin: self.config.grasp.plan_margin, frozen_arms, max_iterations: 4000, ..PlanSettings::default() };
-        let path = match plan(&world, &start, &standoff, &settings, stream) {
-            PlanOutcome::Path(path) => path,
-            PlanOutcome::Failed(failure) => return Err(failure.to_string()),
-        };
-        let limits = self.limits(1.0);
-        let way = time_path(&world, &path, &limits, &settings).ok_or("no free way to time the path")?;
-        let stretch: Vec<Vec<f64>> = (0..grasps[0].approach.len())
-            .map(|i| {
-                let mut q = standoff.clone();
-                for grasp in grasps {
-                    let first = 7 * usize::from(grasp.arm.0);
-                    q[first..first + 7].copy_from_slice(&grasp.approach[i]);
-                }
-                q
-            })
-            .collect();
-        let last_stretch = Trajectory::new(&stretch, &self.limits(self.config.motion.approach_share), 0.01);
-        Ok(Approach { way, last_stretch, seen: self.simulation.object_state().world_from_parts })
-    }
-
-    fn limits(&self, share: f64) -> MotionLimits {
-        let joints = || self.scene.robots.iter().flat_map(|robot| &robot.joints);
-        let motion = &self.config.motion;
-        MotionLimits {
-            velocity: joints().map(|joint| joint.max_velocity * motion.velocity_share * share).collect(),
-            acceleration: joints().map(|joint| joint.max_acceleration * motion.acceleration_share * share).collect(),
-        }
-    }
-
-    /// Opens the grippers, goes to the stand-offs and straight on to the grasps.
-    pub(crate) fn approach(&mut self, grasps: &[Grasp], approach: &Approach) -> Result<(), Failure> {
-        let moving: Vec<(ArmId, PartId)> = grasps.iter().map(|grasp| (grasp.arm, grasp.part)).collect();
-        for grasp in grasps {
-            let part = &self.scene.object.parts[usize::from(grasp.part.0)].name;
-            self.note(format!("arm {} reaches for {part}", grasp.arm.0));
-            self.simulation.grips[usize::from(grasp.arm.0)] = Grip::Open(grasp.opening);
-            for record in self.grasps.iter_mut().filter(|record| record.contact.part == grasp.part) {
-                record.world_from_gripper = Some(grasp.world_from_tool);
-            }
-        }
-        time(Stage::Control, || {
-            self.simulation.follow(&approach.way, &moving, None, &self.config.motion)?;
-            self.simulation.follow(&approach.last_stretch, &moving, Some(&approach.seen), &self.config.motion)
-        })
-    }
-
     /// Closes the grippers and checks by contact that each holds its part.
     pub(crate) fn take_hold(&mut self, grasps: &[Grasp]) -> Result<(), Failure> {
         self.note("close".to_owned());
@@ -377,7 +312,7 @@ impl<'a> Attempt<'a> {
     }
 
     /// (arm, part) pairs that may touch: an arm that holds the object may touch all of it.
-    fn holders(&self) -> Vec<(usize, usize)> {
+    pub(crate) fn holders(&self) -> Vec<(usize, usize)> {
         let parts = 0..self.part_count();
         self.held.iter().flat_map(|(arm, _)| parts.clone().map(|part| (usize::from(arm.0), part))).collect()
     }

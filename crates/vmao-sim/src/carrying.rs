@@ -19,6 +19,8 @@ const SETTLE_AFTER_MOTION: f64 = 0.3;
 const SETTLE_AT_GOAL: f64 = 0.5;
 /// First leg of the alternative route: straight up by this much (m).
 const LIFT_FIRST: f64 = 0.07;
+/// Shares of `grasp.carry_margin` that arms keep from each other on the way: the smaller where the larger leaves no way.
+const MARGINS: [f64; 2] = [0.5, 0.1];
 
 /// Where object and arms are, or will be.
 struct Stance {
@@ -48,17 +50,23 @@ impl CarryPlan {
 }
 
 impl Attempt<'_> {
-    /// Moves the object by object-centric control with all arms that hold it: straight to the step's goal, or up first.
+    /// Moves the object by object-centric control to the step's goal.
     pub(crate) fn move_object(&mut self) -> Result<(), Failure> {
-        let goal = self.step_goal(self.held.len());
+        self.bring(self.step_goal(self.held.len()))
+    }
+
+    /// Moves the object to `goal` with all arms that hold it: straight, or up first.
+    pub(crate) fn bring(&mut self, goal: ObjectGoal) -> Result<(), Failure> {
         let last = self.held.len() == self.part_count();
-        let mut up_first = self.step_goal(self.held.len());
+        let mut up_first = goal.clone();
         let now = self.simulation.object_state();
         up_first.world_from_root = Pose::translation(0.0, 0.0, LIFT_FIRST) * now.world_from_parts[usize::from(goal.root.0)];
         up_first.joint_positions.clone_from(&now.joint_positions);
         let mut blocked = Failure::new(FailureStage::NoPlan, "no route");
-        for route in [vec![goal.clone()], vec![up_first, goal]] {
-            match time(Stage::Planning, || self.plan_route(&route)) {
+        let routes = [vec![goal.clone()], vec![up_first, goal]];
+        let margins = MARGINS.map(|share| share * self.config.grasp.carry_margin);
+        for (margin, route) in margins.iter().flat_map(|&margin| routes.iter().map(move |route| (margin, route))) {
+            match time(Stage::Planning, || self.plan_route(route, margin)) {
                 Err(failure) => blocked = failure,
                 Ok(first) => {
                     let (mut planned, legs) = (Some(first), route.len());
@@ -75,7 +83,7 @@ impl Attempt<'_> {
                         };
                         let plan = match planned.take() {
                             Some(plan) => plan,
-                            None => time(Stage::Planning, || self.plan_carry(&self.stance(), goal))?,
+                            None => time(Stage::Planning, || self.plan_carry(&self.stance(), goal, margin))?,
                         };
                         self.carry_along(&plan, extra)?;
                     }
@@ -87,11 +95,11 @@ impl Attempt<'_> {
     }
 
     /// The plan of the route's first leg, if the others can be planned too from where it is to end.
-    fn plan_route(&self, route: &[ObjectGoal]) -> Result<CarryPlan, Failure> {
-        let first = self.plan_carry(&self.stance(), &route[0])?;
+    fn plan_route(&self, route: &[ObjectGoal], margin: f64) -> Result<CarryPlan, Failure> {
+        let first = self.plan_carry(&self.stance(), &route[0], margin)?;
         let mut end = first.end();
         for goal in &route[1..] {
-            end = self.plan_carry(&end, goal)?.end();
+            end = self.plan_carry(&end, goal, margin)?.end();
         }
         Ok(first)
     }
@@ -129,8 +137,8 @@ impl Attempt<'_> {
         outcome
     }
 
-    /// The object's trajectory from `start` to `goal`, and all arms' joint positions along it, free of collision.
-    fn plan_carry(&self, start: &Stance, goal: &ObjectGoal) -> Result<CarryPlan, Failure> {
+    /// The object's trajectory from `start` to `goal`, and all arms' joint positions along it, `margin` (m) from collision.
+    fn plan_carry(&self, start: &Stance, goal: &ObjectGoal, margin: f64) -> Result<CarryPlan, Failure> {
         let trajectory = self.trajectory_from(start.object.clone(), goal.clone());
         let waypoints = self.waypoints(&trajectory);
         // Arms that hold nothing stay where they are.
@@ -152,7 +160,7 @@ impl Attempt<'_> {
         let mut checker = CollisionChecker::new(&world);
         for waypoint in 1..waypoints.len() {
             let q: Vec<f64> = ways.iter().flat_map(|way| way[waypoint].iter().copied()).collect();
-            if let Some(pair) = checker.check(&q, self.config.grasp.carry_margin / 2.0) {
+            if let Some(pair) = checker.check(&q, margin) {
                 return Err(Failure::new(FailureStage::NoPlan, format!("on the way to the goal {pair}")));
             }
         }

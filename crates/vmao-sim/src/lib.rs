@@ -4,6 +4,7 @@
 #[cfg(test)]
 extern crate self as vmao_sim;
 
+mod approach;
 mod assignment;
 mod attempt;
 mod bodies;
@@ -12,6 +13,7 @@ mod carrying;
 mod combinations;
 mod convention;
 mod dependency_root;
+mod elsewhere;
 mod error;
 mod execution;
 mod exploration;

@@ -1,8 +1,9 @@
 //! From ranked proposals to grasps with a way to them: the first that can be made is taken.
 
-use crate::attempt::{Approach, Attempt, Draw};
+use crate::approach::Approach;
+use crate::attempt::{Attempt, Draw};
 use crate::failure::Failure;
-use crate::grasping::{Grasp, object_cloud};
+use crate::grasping::Grasp;
 use crate::profile::{Stage, time};
 use vmao_core::contact_model::FingerPoints;
 
@@ -46,12 +47,12 @@ impl Attempt<'_> {
     /// Of each grasp's proposals those that its arm alone can reach and carry, still best first.
     fn graspable(&self, proposals: &[Vec<FingerPoints>]) -> Vec<Vec<FingerPoints>> {
         let first = self.held.len();
-        let cloud = object_cloud(&self.grasps[first].observation);
         let motion = self.waypoints(&self.trajectory(self.step_goal(first + proposals.len())));
         let mut stream = self.stream(Draw::Reach);
         let mut kept = Vec::with_capacity(proposals.len());
         for (ranked, &part) in proposals.iter().zip(&self.sequence[first..]) {
             let arm = self.arms[usize::from(part.0)];
+            let cloud = self.cloud_on(part);
             let mut possible = |fingers: &&FingerPoints| {
                 let found = self.within_reach((arm, part), (&cloud, fingers), &motion, &mut stream);
                 found.is_ok_and(|grasps| !grasps.is_empty())

@@ -86,9 +86,8 @@ pub fn run_trial(
 fn manipulate(attempt: &mut Attempt<'_>, model: &dyn ContactModel, order: GraspOrder) -> Result<(), Failure> {
     attempt.settled()?;
     for step in order.steps(attempt.part_count()) {
-        let proposals = attempt.propose_contacts(model, step)?;
-        let (grasps, approach) = attempt.first_feasible(&proposals)?;
-        attempt.approach(&grasps, &approach)?;
+        let (grasps, approach) = attempt.find_grasps(model, step)?;
+        let grasps = attempt.approach(grasps, approach)?;
         attempt.take_hold(&grasps)?;
         attempt.move_object()?;
     }
