@@ -25,6 +25,7 @@ use vmao_core::order::GraspOrder;
 use vmao_core::outcome::{FailureStage, TrialOutcome};
 use vmao_core::random::Stream;
 use vmao_core::record::{GraspRecord, TrialRecord};
+use vmao_core::rollout::RolloutContact;
 
 /// Random streams of a trial, each its own so that two methods meet the same scene and goal.
 #[derive(Clone, Copy)]
@@ -198,11 +199,19 @@ impl<'a> Attempt<'a> {
         Ok(contacts)
     }
 
-    /// Forgets the contacts of grasps that were not made.
-    pub(crate) fn forget_contacts(&mut self) {
-        self.grasps.truncate(self.held.len());
+    /// Forgets the contacts of grasps that were not made, and answers them.
+    pub(crate) fn forget_contacts(&mut self) -> (Vec<GraspRecord>, Vec<RolloutContact>) {
+        let made = self.held.len();
+        let shown = self.simulation.recorder.as_mut().map(|recorder| recorder.rollout.contacts.split_off(made));
+        (self.grasps.split_off(made), shown.unwrap_or_default())
+    }
+
+    /// Puts forgotten contacts back in the place of those of grasps that were not made.
+    pub(crate) fn recall_contacts(&mut self, (grasps, shown): (Vec<GraspRecord>, Vec<RolloutContact>)) {
+        self.forget_contacts();
+        self.grasps.extend(grasps);
         if let Some(recorder) = &mut self.simulation.recorder {
-            recorder.rollout.contacts.truncate(self.held.len());
+            recorder.rollout.contacts.extend(shown);
         }
     }
 

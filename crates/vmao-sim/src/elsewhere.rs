@@ -17,21 +17,19 @@ const PLACES: [[f64; 2]; 4] = [[0.5, 0.0], [-0.5, 0.0], [0.0, 0.07], [0.0, -0.05
 impl Attempt<'_> {
     /// Looks, asks the model for the contacts of the grasps `step`, and answers grasps on them with a way there.
     ///
-    /// While other arms hold the object it is in their hands where it is: if there is no way, they bring it to a few other places, and
-    /// the first from which there is one is taken. Fails as the first place fails.
+    /// While other arms hold the object it is where they hold it: if the next find no way to it, they bring it to a few other
+    /// places, and the first from which there is a way is taken. Fails as the last place that was looked at fails, whose
+    /// contacts are recorded.
     pub(crate) fn find_grasps(
         &mut self,
         model: &dyn ContactModel,
         step: Range<usize>,
     ) -> Result<(Vec<Grasp>, Approach), Failure> {
         let proposals = self.propose_contacts(model, step.clone())?;
-        let failure = match self.first_feasible(&proposals) {
-            Ok(found) => return Ok(found),
-            Err(failure) => failure,
+        let mut failure = match self.first_feasible(&proposals) {
+            Err(failure) if !self.held.is_empty() => failure,
+            found => return found,
         };
-        if self.held.is_empty() || !matches!(failure.stage, FailureStage::NoPlan | FailureStage::Unreachable) {
-            return Err(failure);
-        }
         for goal in self.other_places() {
             self.note("no way to the next grasp: bring the object elsewhere".to_owned());
             match self.bring(goal) {
@@ -39,10 +37,14 @@ impl Attempt<'_> {
                 Err(blocked) if matches!(blocked.stage, FailureStage::NoPlan | FailureStage::Unreachable) => continue,
                 Err(lost) => return Err(lost),
             }
-            self.forget_contacts();
-            let proposals = self.propose_contacts(model, step.clone())?;
-            if let Ok(found) = self.first_feasible(&proposals) {
-                return Ok(found);
+            let before = self.forget_contacts();
+            let Ok(proposals) = self.propose_contacts(model, step.clone()) else {
+                self.recall_contacts(before);
+                continue;
+            };
+            match self.first_feasible(&proposals) {
+                Err(still) => failure = still,
+                found => return found,
             }
         }
         Err(failure)

@@ -15,6 +15,7 @@ mod object_trees;
 mod rays;
 mod reachability;
 mod runaways;
+mod second_looks;
 mod starts_and_goals;
 #[path = "../../tests/support/mod.rs"]
 mod support;
