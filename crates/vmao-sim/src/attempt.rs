@@ -46,6 +46,9 @@ const REST_SPEED: f64 = 2e-3;
 /// Steps in which the motion after a later grasp is looked at.
 const RESERVE_WAYPOINTS: usize = 4;
 
+/// Share of `grasp.carry_margin` that arms keep from each other on the way to the goal where all of it leaves none.
+pub(crate) const TIGHT: f64 = 0.1;
+
 /// A trial under way.
 pub(crate) struct Attempt<'a> {
     pub(crate) scene: &'a Scene,
@@ -244,7 +247,10 @@ impl<'a> Attempt<'a> {
             candidates.push(self.within_reach((arms[usize::from(part.0)], part), (&cloud, fingers), &motion, stream)?);
         }
         let reserve = self.reserve(arms, first + contacts.len(), &motion, stream);
-        compatible_grasps(&self.simulation, config, &candidates, &holders, &reserve)
+        compatible_grasps(&self.simulation, config, &candidates, &holders, &reserve).or_else(|failure| {
+            let tight = GraspConfig { carry_margin: TIGHT * config.carry_margin, ..config.clone() };
+            compatible_grasps(&self.simulation, &tight, &candidates, &holders, &reserve).map_err(|_still| failure)
+        })
     }
 
     /// The grasps of `part` at these points that `arm` can make and carry as far as it alone is concerned.

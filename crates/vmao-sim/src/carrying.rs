@@ -1,6 +1,6 @@
 //! The trial's motion of the object: plan it for all arms that hold it, then carry it along.
 
-use crate::attempt::Attempt;
+use crate::attempt::{Attempt, TIGHT};
 use crate::failure::Failure;
 use crate::grasping::{MAX_JOINT_STEP, ik_settings};
 use crate::planning_world::{Obstacles, collision_world};
@@ -20,7 +20,7 @@ const SETTLE_AT_GOAL: f64 = 0.5;
 /// First leg of the alternative route: straight up by this much (m).
 const LIFT_FIRST: f64 = 0.07;
 /// Shares of `grasp.carry_margin` that arms keep from each other on the way: the smaller where the larger leaves no way.
-const MARGINS: [f64; 2] = [0.5, 0.1];
+const MARGINS: [f64; 2] = [0.5, TIGHT];
 
 /// Where object and arms are, or will be.
 struct Stance {

@@ -17,16 +17,15 @@ const PLACES: [[f64; 2]; 4] = [[0.5, 0.0], [-0.5, 0.0], [0.0, 0.07], [0.0, -0.05
 impl Attempt<'_> {
     /// Looks, asks the model for the contacts of the grasps `step`, and answers grasps on them with a way there.
     ///
-    /// While other arms hold the object it is where they hold it: if the next find no way to it, they bring it to a few other
-    /// places, and the first from which there is a way is taken. Fails as the last place that was looked at fails, whose
-    /// contacts are recorded.
+    /// While other arms hold the object it is where they hold it: if the next see nothing to touch or find no way to it, they
+    /// bring it to a few other places, and the first from which there is a way is taken. Recorded are the contacts of the last
+    /// look that had any, and without a way this fails as they do.
     pub(crate) fn find_grasps(
         &mut self,
         model: &dyn ContactModel,
         step: Range<usize>,
     ) -> Result<(Vec<Grasp>, Approach), Failure> {
-        let proposals = self.propose_contacts(model, step.clone())?;
-        let mut failure = match self.first_feasible(&proposals) {
+        let mut failure = match self.look_for_grasps(model, step.clone()) {
             Err(failure) if !self.held.is_empty() => failure,
             found => return found,
         };
@@ -38,16 +37,18 @@ impl Attempt<'_> {
                 Err(lost) => return Err(lost),
             }
             let before = self.forget_contacts();
-            let Ok(proposals) = self.propose_contacts(model, step.clone()) else {
-                self.recall_contacts(before);
-                continue;
-            };
-            match self.first_feasible(&proposals) {
+            match self.look_for_grasps(model, step.clone()) {
+                Err(unseen) if unseen.stage == FailureStage::NoContact => self.recall_contacts(before),
                 Err(still) => failure = still,
                 found => return found,
             }
         }
         Err(failure)
+    }
+
+    fn look_for_grasps(&mut self, model: &dyn ContactModel, step: Range<usize>) -> Result<(Vec<Grasp>, Approach), Failure> {
+        let proposals = self.propose_contacts(model, step)?;
+        self.first_feasible(&proposals)
     }
 
     /// The step's place of the object, displaced about its middle.

@@ -24,25 +24,19 @@ const VERIFIED: u64 = 1 << 36;
 /// Letters of a value that a message shows.
 const SHOWN: usize = 80;
 
-/// Two points that no gripper is wide enough for (m).
-const OUT_OF_REACH: [[f64; 3]; 2] = [[0.0, 0.0, 0.0], [1e3, 0.0, 0.0]];
-
 /// The contacts of a record, as they were proposed.
 ///
 /// Proposals are points of the cloud, whose coordinates are singles: rounding the recorded point of the part, put back into
-/// the world, to single precision gives the very point that was proposed. Looks that were followed by others, because there was no way
-/// to what was proposed (`vmao_sim`'s `elsewhere`), are not recorded: wherever the part is elsewhere than recorded, points are proposed to
-/// which there is no way either.
+/// the world, to single precision gives the very point that was proposed. Of a grasp that was looked for more than once (`vmao_sim`'s
+/// `elsewhere`) the last contacts are recorded: wherever the part is elsewhere than recorded, nothing is proposed, so that the arms bring it on.
 struct RecordedContacts<'a>(&'a TrialRecord);
 
 impl ContactModel for RecordedContacts<'_> {
     fn propose(&self, query: &ContactQuery<'_>, _stream: &mut Stream) -> Vec<FingerPoints> {
         let proposed = |point: Point3<f64>| (query.world_from_part * point).map(|x| f64::from(x as f32));
-        let here = |grasp: &GraspRecord| match grasp.world_from_part == *query.world_from_part {
-            true => grasp.contact.fingers.map(proposed),
-            false => OUT_OF_REACH.map(Point3::from),
-        };
-        self.0.grasps.get(query.grasp).map(here).into_iter().collect()
+        let here = |grasp: &&GraspRecord| grasp.world_from_part == *query.world_from_part;
+        let grasp = self.0.grasps.get(query.grasp).filter(here);
+        grasp.map(|grasp| grasp.contact.fingers.map(proposed)).into_iter().collect()
     }
 }
 
