@@ -90,7 +90,7 @@ impl Attempt<'_> {
     /// A part that hangs free may move before the hands are at their stand-offs. Then the rest is planned again for the same points.
     pub(crate) fn approach(&mut self, mut grasps: Vec<Grasp>, mut approach: Approach) -> Result<Vec<Grasp>, Failure> {
         for again in (0..=PLANNED_AGAIN).rev() {
-            self.open_for(&grasps);
+            self.open_for(&grasps, &approach.seen);
             time(Stage::Control, || self.simulation.follow(&approach.way, &moving(&grasps), None, &self.config.motion))?;
             if again == 0 || !self.moved_since(&grasps, &approach.seen) {
                 break;
@@ -104,13 +104,15 @@ impl Attempt<'_> {
         Ok(grasps)
     }
 
-    fn open_for(&mut self, grasps: &[Grasp]) {
+    /// Opens the grippers, and notes the grasps planned with the parts at `seen` as they are on the parts that were looked at.
+    fn open_for(&mut self, grasps: &[Grasp], seen: &[Pose]) {
         for grasp in grasps {
             let part = &self.scene.object.parts[usize::from(grasp.part.0)].name;
             self.note(format!("arm {} reaches for {part}", grasp.arm.0));
             self.simulation.grips[usize::from(grasp.arm.0)] = Grip::Open(grasp.opening);
             for record in self.grasps.iter_mut().filter(|record| record.contact.part == grasp.part) {
-                record.world_from_gripper = Some(grasp.world_from_tool);
+                let part_from_tool = seen[usize::from(grasp.part.0)].inverse() * grasp.world_from_tool;
+                record.world_from_gripper = Some(record.world_from_part * part_from_tool);
             }
         }
     }
@@ -132,9 +134,9 @@ impl Attempt<'_> {
         let first = self.held.len();
         let here = |record: &GraspRecord| record.contact.fingers.map(|point| now[usize::from(record.contact.part.0)] * point);
         let contacts: Vec<FingerPoints> = self.grasps[first..first + count].iter().map(here).collect();
-        let mut stream = self.stream(Draw::Reach);
-        let choices = time(Stage::Grasping, || self.choices(&self.arms, &contacts, &mut stream))?;
-        self.plan_approach(if choices.roomy.is_empty() { choices.crowded } else { choices.roomy })
+        let arms = [self.arms.clone()];
+        let (_, grasps) = time(Stage::Grasping, || self.choose_among(&arms, &contacts))?;
+        self.plan_approach(grasps)
     }
 }
 

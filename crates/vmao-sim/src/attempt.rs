@@ -1,4 +1,4 @@
-//! The steps of one trial. Each method is one line of the algorithm; [`crate::trial`] strings them together.
+//! The state of one trial and its steps: looking, choosing, holding, judging. [`crate::trial`] strings them together.
 
 use crate::assignment::assignments;
 use crate::cameras::observe;
@@ -18,7 +18,7 @@ use nalgebra::Point3;
 use std::ops::Range;
 use vmao_core::contact::{ArmId, Contact, PartId};
 use vmao_core::contact_model::{ContactModel, ContactQuery, FingerPoints};
-use vmao_core::geometry::{Pose, interpolate};
+use vmao_core::geometry::{Pose, interpolate, rotation_distance};
 use vmao_core::object::{ObjectGoal, ObjectState};
 use vmao_core::object_graph::ObjectGraph;
 use vmao_core::order::GraspOrder;
@@ -73,6 +73,10 @@ pub(crate) struct Attempt<'a> {
     pub(crate) factor: f64,
     /// How the motions of the object went with all parts held.
     pub(crate) measuring: Measuring,
+    /// Where each of the hands that hold was on its part when it had closed.
+    pub(crate) closed: Vec<Pose>,
+    /// The most that any part has turned in its hand since then (rad).
+    pub(crate) turned: f64,
     settled: Result<(), Failure>,
 }
 
@@ -132,6 +136,8 @@ impl<'a> Attempt<'a> {
             errors,
             factor: f64::INFINITY,
             measuring: Measuring::default(),
+            closed: Vec::new(),
+            turned: 0.0,
             settled,
         }
     }
@@ -222,23 +228,49 @@ impl<'a> Attempt<'a> {
     ///
     /// Arms are assigned to parts by distance; the other way round only if that leaves no way, now or for later grasps.
     pub(crate) fn choose_grasps(&mut self, contacts: &[FingerPoints]) -> Result<Vec<Vec<Grasp>>, Failure> {
-        let mut stream = self.stream(Draw::Reach);
         let now = self.simulation.object_state().world_from_parts;
-        let mut crowded = Err(Failure::new(FailureStage::NoPlan, "no arm is free"));
-        for (rank, arms) in assignments(self.scene, &self.held, &[&now, &self.goal_parts]).into_iter().enumerate() {
-            match time(Stage::Grasping, || self.choices(&arms, contacts, &mut stream)) {
-                Ok(Choices { roomy, .. }) if !roomy.is_empty() => return Ok(self.assign(&arms, roomy)),
-                Ok(choices) if crowded.is_err() => crowded = Ok((arms, choices.crowded)),
-                Err(failure) if rank == 0 => crowded = Err(failure),
-                _ => {}
+        let assignments = assignments(self.scene, &self.held, &[&now, &self.goal_parts]);
+        let (arms, grasps) = time(Stage::Grasping, || self.choose_among(&assignments, contacts))?;
+        Ok(self.assign(&arms, grasps))
+    }
+
+    /// The first of these assignments that leaves later arms room, or that leaves a way at all, and its grasps, best first.
+    ///
+    /// Where none leaves a way with all of `grasp.carry_margin` between what is carried, a share of it has to do.
+    pub(crate) fn choose_among(
+        &self,
+        assignments: &[Vec<ArmId>],
+        contacts: &[FingerPoints],
+    ) -> Result<(Vec<ArmId>, Vec<Vec<Grasp>>), Failure> {
+        let mut stream = self.stream(Draw::Reach);
+        let tight = GraspConfig { carry_margin: TIGHT * self.config.grasp.carry_margin, ..self.config.grasp.clone() };
+        let mut first = Failure::new(FailureStage::NoPlan, "no arm is free");
+        for (config, is_first) in [(&self.config.grasp, true), (&tight, false)] {
+            let mut crowded = None;
+            for (rank, arms) in assignments.iter().enumerate() {
+                match self.choices(arms, contacts, config, &mut stream) {
+                    Ok(Choices { roomy, .. }) if !roomy.is_empty() => return Ok((arms.clone(), roomy)),
+                    Ok(choices) => drop(crowded.get_or_insert((arms.clone(), choices.crowded))),
+                    Err(failure) if is_first && rank == 0 => first = failure,
+                    Err(_) => {}
+                }
+            }
+            if let Some(found) = crowded {
+                return Ok(found);
             }
         }
-        crowded.map(|(arms, grasps)| self.assign(&arms, grasps))
+        Err(first)
     }
 
     /// The combinations of grasps on these contacts that the arms can make if part p is taken by `arms[p]`.
-    pub(crate) fn choices(&self, arms: &[ArmId], contacts: &[FingerPoints], stream: &mut Stream) -> Result<Choices, Failure> {
-        let (first, config) = (self.held.len(), &self.config.grasp);
+    fn choices(
+        &self,
+        arms: &[ArmId],
+        contacts: &[FingerPoints],
+        config: &GraspConfig,
+        stream: &mut Stream,
+    ) -> Result<Choices, Failure> {
+        let first = self.held.len();
         let holders = self.holders();
         let motion = self.waypoints(&self.trajectory(self.step_goal(first + contacts.len())));
         let mut candidates = Vec::new();
@@ -247,10 +279,7 @@ impl<'a> Attempt<'a> {
             candidates.push(self.within_reach((arms[usize::from(part.0)], part), (&cloud, fingers), &motion, stream)?);
         }
         let reserve = self.reserve(arms, first + contacts.len(), &motion, stream);
-        compatible_grasps(&self.simulation, config, &candidates, &holders, &reserve).or_else(|failure| {
-            let tight = GraspConfig { carry_margin: TIGHT * config.carry_margin, ..config.clone() };
-            compatible_grasps(&self.simulation, &tight, &candidates, &holders, &reserve).map_err(|_still| failure)
-        })
+        compatible_grasps(&self.simulation, config, &candidates, &holders, &reserve)
     }
 
     /// The grasps of `part` at these points that `arm` can make and carry as far as it alone is concerned.
@@ -323,6 +352,8 @@ impl<'a> Attempt<'a> {
         self.note("close".to_owned());
         time(Stage::Control, || self.simulation.close(grasps, &self.config.grasp))?;
         self.held.extend(grasps.iter().map(|grasp| (grasp.arm, grasp.part)));
+        let known = self.closed.len();
+        self.closed.extend(self.simulation.part_from_tools(&self.held[known..]));
         Ok(())
     }
 
@@ -332,10 +363,20 @@ impl<'a> Attempt<'a> {
         self.held.iter().flat_map(|(arm, _)| parts.clone().map(|part| (usize::from(arm.0), part))).collect()
     }
 
-    /// Whether the goal was met while it was to be held.
+    /// Notes how far parts have turned in the hands that hold them.
+    pub(crate) fn note_turns(&mut self) {
+        let now = self.simulation.part_from_tools(&self.held);
+        let turns = self.closed.iter().zip(&now).map(|(closed, now)| rotation_distance(&closed.rotation, &now.rotation));
+        self.turned = turns.fold(self.turned, f64::max);
+    }
+
+    /// Whether the goal was met while it was to be held, by hands in which no part turned further than it may.
     pub(crate) fn goal_held(&self) -> Result<(), Failure> {
         if self.factor <= 1.0 {
-            return Ok(());
+            let most = self.config.most_turn;
+            let (turned, may) = (self.turned.to_degrees(), most.to_degrees());
+            let why = || format!("a part turned by {turned:.1}° in its hand, at most {may:.1}° may be learned from");
+            return if self.turned <= most { Ok(()) } else { Err(Failure::new(FailureStage::Slip, why())) };
         }
         let [position, rotation, turn, slide] = self.errors;
         let why = format!(

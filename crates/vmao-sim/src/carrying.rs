@@ -134,6 +134,7 @@ impl Attempt<'_> {
         let outcome = time(Stage::Control, || self.simulation.carry(trajectory, &held, postures, extra, motion, at_tick));
         self.errors = errors;
         self.factor = worst;
+        self.note_turns();
         outcome
     }
 

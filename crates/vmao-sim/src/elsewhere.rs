@@ -12,7 +12,7 @@ use vmao_core::object::ObjectGoal;
 use vmao_core::outcome::FailureStage;
 
 /// Where else the object is brought in turn: turned about the vertical by the first number (rad), raised by the second (m).
-const PLACES: [[f64; 2]; 4] = [[0.5, 0.0], [-0.5, 0.0], [0.0, 0.07], [0.0, -0.05]];
+const PLACES: [[f64; 2]; 5] = [[0.5, 0.0], [-0.5, 0.0], [0.0, 0.07], [0.5, 0.07], [-0.5, 0.07]];
 
 impl Attempt<'_> {
     /// Looks, asks the model for the contacts of the grasps `step`, and answers grasps on them with a way there.
@@ -25,18 +25,27 @@ impl Attempt<'_> {
         model: &dyn ContactModel,
         step: Range<usize>,
     ) -> Result<(Vec<Grasp>, Approach), Failure> {
+        let arms = self.arms.clone();
         let mut failure = match self.look_for_grasps(model, step.clone()) {
             Err(failure) if !self.held.is_empty() => failure,
             found => return found,
         };
         for goal in self.other_places() {
             self.note("no way to the next grasp: bring the object elsewhere".to_owned());
+            let steps = self.simulation.steps;
             match self.bring(goal) {
                 Ok(()) => {}
-                Err(blocked) if matches!(blocked.stage, FailureStage::NoPlan | FailureStage::Unreachable) => continue,
+                Err(blocked) if matches!(blocked.stage, FailureStage::NoPlan | FailureStage::Unreachable) => {
+                    // Half of a way that was broken off is another place, too.
+                    if self.simulation.steps == steps {
+                        continue;
+                    }
+                }
                 Err(lost) => return Err(lost),
             }
             let before = self.forget_contacts();
+            // A look does not depend on what was tried at the place before.
+            self.arms.clone_from(&arms);
             match self.look_for_grasps(model, step.clone()) {
                 Err(unseen) if unseen.stage == FailureStage::NoContact => self.recall_contacts(before),
                 Err(still) => failure = still,

@@ -208,7 +208,8 @@ impl Simulation<'_> {
         Ok(())
     }
 
-    fn part_from_tools(&self, held: &[(ArmId, PartId)]) -> Vec<Pose> {
+    /// Where the tool of each of these arms is on the part that it holds.
+    pub(crate) fn part_from_tools(&self, held: &[(ArmId, PartId)]) -> Vec<Pose> {
         let parts = self.object_state().world_from_parts;
         held.iter().map(|(arm, part)| parts[usize::from(part.0)].inverse() * self.tool_pose(usize::from(arm.0))).collect()
     }

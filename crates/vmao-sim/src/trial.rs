@@ -35,6 +35,8 @@ pub struct TrialConfig {
     pub motion: MotionConfig,
     /// The controller's gains.
     pub osc: OscGains,
+    /// A trial in which a part turns further in a hand that holds it is no success (rad).
+    pub most_turn: f64,
 }
 
 /// Whether a trial's motion is kept for the viewer.

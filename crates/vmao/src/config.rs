@@ -139,6 +139,8 @@ pub struct ExploreConfig {
     pub demonstrations: String,
     /// Tuples whose contacts are all closer than this are near-duplicates (m).
     pub near_distance: f64,
+    /// A trial in which a part turns further in its hand is not accepted (degrees).
+    pub most_turn_deg: f64,
     /// What the label set does with accepted near-duplicates.
     pub near_duplicates: NearDuplicates,
 }
@@ -211,6 +213,11 @@ impl Config {
         self.to_toml().map(|text| sha256_hex(text.as_bytes()))
     }
 
+    /// The same of an explored trial, whose success is to be worth learning from.
+    pub fn explored_trial_config(&self) -> TrialConfig {
+        TrialConfig { most_turn: self.explore.most_turn_deg.to_radians(), ..self.trial_config() }
+    }
+
     /// What the simulator needs to know of a trial.
     pub fn trial_config(&self) -> TrialConfig {
         TrialConfig {
@@ -221,6 +228,7 @@ impl Config {
             grasp: self.grasp.clone(),
             motion: self.motion.clone(),
             osc: self.osc,
+            most_turn: f64::INFINITY,
         }
     }
 
@@ -323,6 +331,7 @@ impl Config {
         at_least_one("explore.successes", explore.successes)?;
         at_least_one("explore.max_trials", explore.max_trials)?;
         within("explore.near_distance", explore.near_distance, 0.0, 1.0)?;
+        within("explore.most_turn_deg", explore.most_turn_deg, 0.0, 180.0)?;
         let known = self.demonstrations();
         let usable = !matches!(&known, Demonstrations::File(name) if !is_path(name));
         ensure(usable, "explore.demonstrations", &explore.demonstrations, "own, found, or a path")?;

@@ -89,7 +89,13 @@ impl<'a> Explorer<'a> {
     /// The exploration of this configuration and seed.
     pub fn new(config: &'a Config, seed: u64) -> Result<Self, Failure> {
         let proposals = Proposals { radius: config.explore.radius, orders: config.explored_orders() };
-        Ok(Self { config, seed, scenes: scenes(config, InstanceSet::Train)?, trial_config: config.trial_config(), proposals })
+        Ok(Self {
+            config,
+            seed,
+            scenes: scenes(config, InstanceSet::Train)?,
+            trial_config: config.explored_trial_config(),
+            proposals,
+        })
     }
 
     /// Names of the object's parts.

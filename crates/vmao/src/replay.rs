@@ -45,7 +45,7 @@ pub fn run_again(config: &Config, record: &TrialRecord, recording: Recording) ->
     let scenes = scenes(config, InstanceSet::Train)?;
     let scene = &scenes[scene_of_trial(record.seed, record.index, scenes.len())];
     let trial = (record.seed, record.index);
-    Ok(run_trial(scene, &config.trial_config(), &RecordedContacts(record), record.order, trial, recording))
+    Ok(run_trial(scene, &config.explored_trial_config(), &RecordedContacts(record), record.order, trial, recording))
 }
 
 /// The first column in which two records differ, with both values; none if they are equal bit for bit.

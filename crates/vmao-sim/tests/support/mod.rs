@@ -44,7 +44,7 @@ pub(crate) fn configuration_with(settings: &[(&str, &str)]) -> (SceneConfig, Tri
         shipped[section].as_table_mut().unwrap().extend(value);
     }
     let Shipped { scene, start, goal, thresholds, cameras, grasp, motion, osc } = shipped.try_into().unwrap();
-    (scene, TrialConfig { start, goal, thresholds, cameras, grasp, motion, osc })
+    (scene, TrialConfig { start, goal, thresholds, cameras, grasp, motion, osc, most_turn: f64::INFINITY })
 }
 
 /// Two Pandas and the pliers in their `instance`-th training size.

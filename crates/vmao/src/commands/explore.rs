@@ -11,7 +11,7 @@ use std::path::Path;
 
 #[derive(Debug, clap::Args)]
 pub(super) struct ExploreArguments {
-    /// Successes wanted, over the configuration's
+    /// Successes wanted, over the configuration's; whole rounds run, so that there may be some more
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..))]
     successes: Option<u64>,
     /// Trials at most, over the configuration's
