@@ -176,8 +176,8 @@ fn verify_exploration(
 ) -> Result<(), Failure> {
     let explorer = Explorer::new(config, info.seed)?;
     let mut labels = explorer.demonstrated();
-    for round in dataset::rounds(data)? {
-        let round = round?;
+    for round in dataset::rounds(data).or_bad_input()? {
+        let round = round.or_bad_input()?;
         let indices: Vec<u64> = round.iter().map(|record| record.index).filter(|index| chosen.contains(index)).collect();
         let again = explorer.run(&labels, &indices, &|_| ());
         for again in again {

@@ -2,6 +2,7 @@
 
 use crate::picture::{Framing, Layer, Studio, sheet};
 use rayon::prelude::*;
+use std::collections::BTreeSet;
 use std::f64::consts::FRAC_PI_2;
 use vmao_core::rollout::Rollout;
 use vmao_sim::Picture;
@@ -14,7 +15,10 @@ const VIEWS: [[f64; 2]; 2] = [[0.0, 0.3], [FRAC_PI_2, 0.75]];
 /// When something has come about: the start, each hold, each place that the object was brought to, the end (s).
 fn key_times(rollout: &Rollout) -> Vec<f64> {
     let end = rollout.frames.len().saturating_sub(1) as f64 * rollout.frame_seconds;
-    let begins = |label: &str| label.starts_with("move the object") || label.contains(" reaches for ");
+    // An arm whose way is planned again reaches for its part a second time.
+    let mut reached = BTreeSet::new();
+    let mut begins =
+        |label: &str| label.starts_with("move the object") || label.contains(" reaches for ") && reached.insert(label.to_owned());
     let events = rollout.events.iter().filter(|event| begins(&event.label)).map(|event| event.time);
     let mut times: Vec<f64> = [0.0].into_iter().chain(events).chain([end]).map(|time| time.clamp(0.0, end)).collect();
     // Arms that grasp together begin at one time.
