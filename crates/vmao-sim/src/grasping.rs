@@ -34,7 +34,7 @@ pub struct GraspConfig {
     pub lean_forward: f64,
     /// Preferred lean towards the object's other parts, so that the hand stays outside, per unit down (–).
     pub lean_inward: f64,
-    /// Distance that arms keep from each other while they carry the object (m).
+    /// Distance from each other at which arms plan to carry the object (m); less of it where it leaves no way (D18).
     pub carry_margin: f64,
     /// Cost of an approach per squared deviation from that direction, against the posture's cost.
     pub approach_cost: f64,
