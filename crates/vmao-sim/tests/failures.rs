@@ -3,13 +3,13 @@
 mod support;
 
 use nalgebra::Point3;
-use support::{SEED, WorldPoints, configuration, failed_at, scene};
+use support::{SEED, WorldPoints, configuration, demonstrated_trial, failed_at, scene};
 use vmao_core::contact::{Contact, PartId};
 use vmao_core::contact_model::{ContactModel, ContactQuery, FingerPoints, FixedTuple};
 use vmao_core::order::GraspOrder;
 use vmao_core::outcome::FailureStage;
 use vmao_core::random::Stream;
-use vmao_sim::{Recording, Trial, run_trial};
+use vmao_sim::{Recording, Trial, TrialConfig, run_trial};
 
 /// Runs a trial with this model in both orders and checks where it fails; returns the last.
 #[track_caller]
@@ -124,4 +124,16 @@ fn the_first_proposal_that_can_be_made_is_taken_and_recorded() {
         assert_eq!(ranked.record, alone.record, "{order:?}: as if only this had been proposed");
         assert_eq!(ranked.rollout, alone.rollout, "{order:?}");
     }
+}
+
+#[test]
+fn a_part_that_turned_further_in_its_hand_than_may_be_learned_from_is_a_slip() {
+    let scene = scene(0);
+    let (_, config) = configuration();
+    let [loose, firm] = [f64::INFINITY, 1e-6]
+        .map(|most_turn| demonstrated_trial(&scene, &TrialConfig { most_turn, ..config.clone() }, GraspOrder::Sequential, 0));
+    assert!(loose.record.outcome.is_success(), "{}", loose.record.detail);
+    assert_eq!(failed_at(&firm), FailureStage::Slip);
+    assert!(firm.record.detail.contains("turned by"), "{}", firm.record.detail);
+    assert_eq!(firm.record.steps, loose.record.steps, "judged at the end: the motion is the same");
 }
