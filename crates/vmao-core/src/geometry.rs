@@ -47,6 +47,11 @@ pub fn rotation_distance(a: &UnitQuaternion<f64>, b: &UnitQuaternion<f64>) -> f6
     rotation_log(&(a.inverse() * b)).norm()
 }
 
+/// Distance between two poses' origins (m), and the angle between their orientations in [0, π] rad.
+pub fn pose_distance(a: &Pose, b: &Pose) -> [f64; 2] {
+    [(a.translation.vector - b.translation.vector).norm(), rotation_distance(&a.rotation, &b.rotation)]
+}
+
 /// The pose a `fraction` of the way from `start` to `end`: straight in position, constant-axis in rotation.
 pub fn interpolate(start: &Pose, end: &Pose, fraction: f64) -> Pose {
     let turn = rotation_log(&(end.rotation * start.rotation.inverse()));

@@ -56,10 +56,10 @@ pub fn gripper_poses(fingers: &[Point3<f64>; 2], count: usize) -> Vec<GripperPos
 
 /// The same contacts with the closing axis turned square to the bar they lie on and flat on its sides, about the bar's middle.
 ///
-/// The bar's direction is the principal axis of the cloud `points` around the contacts' middle; flat is
-/// along an edge of the rectangle that fits its cross-section best, and level if all ways are alike. Pads that close askew turn the part or the hand until
-/// they lie flat; planning for the square grasp foresees it. `None` where the points nearby are not drawn out like a bar, the
-/// contacts lie far beside it, or the axis would have to turn by more than `limit` (rad).
+/// The bar's direction is the principal axis of the cloud `points` around the contacts' middle; flat is along an edge of
+/// the rectangle that fits its cross-section best, and level if all ways are alike. Pads that close askew turn the part or
+/// the hand until they lie flat; planning for the square grasp foresees it. `None` where the points nearby are not drawn out
+/// like a bar, the contacts lie far beside it, or the axis would have to turn by more than `limit` (rad).
 pub fn squared(fingers: &[Point3<f64>; 2], points: &[Point3<f64>], limit: f64) -> Option<[Point3<f64>; 2]> {
     let middle = nalgebra::center(&fingers[0], &fingers[1]);
     let near: Vec<Vector3<f64>> =

@@ -9,7 +9,7 @@ use crate::profile::{Stage, time};
 use crate::simulation::Grip;
 use vmao_core::contact::{ArmId, PartId};
 use vmao_core::contact_model::FingerPoints;
-use vmao_core::geometry::{Pose, rotation_distance};
+use vmao_core::geometry::{Pose, pose_distance};
 use vmao_core::object_centric::gripper_goal;
 use vmao_core::outcome::FailureStage;
 use vmao_core::planning::{PlanOutcome, PlanSettings, plan, time_path};
@@ -111,8 +111,8 @@ impl Attempt<'_> {
             self.note(format!("arm {} reaches for {part}", grasp.arm.0));
             self.simulation.grips[usize::from(grasp.arm.0)] = Grip::Open(grasp.opening);
             for record in self.grasps.iter_mut().filter(|record| record.contact.part == grasp.part) {
-                let part_from_tool = seen[usize::from(grasp.part.0)].inverse() * grasp.world_from_tool;
-                record.world_from_gripper = Some(record.world_from_part * part_from_tool);
+                let planned_on = &seen[usize::from(grasp.part.0)];
+                record.world_from_gripper = Some(gripper_goal(planned_on, &record.world_from_part, &grasp.world_from_tool));
             }
         }
     }
@@ -122,9 +122,8 @@ impl Attempt<'_> {
         let now = self.simulation.object_state().world_from_parts;
         grasps.iter().any(|grasp| {
             let (part, tool) = (usize::from(grasp.part.0), &grasp.world_from_tool);
-            let goal = gripper_goal(&seen[part], &now[part], tool);
-            let shift = (goal.translation.vector - tool.translation.vector).norm();
-            shift > MOVED[0] || rotation_distance(&goal.rotation, &tool.rotation) > MOVED[1]
+            let [shift, turn] = pose_distance(&gripper_goal(&seen[part], &now[part], tool), tool);
+            shift > MOVED[0] || turn > MOVED[1]
         })
     }
 

@@ -244,22 +244,21 @@ impl<'a> Attempt<'a> {
     ) -> Result<(Vec<ArmId>, Vec<Vec<Grasp>>), Failure> {
         let mut stream = self.stream(Draw::Reach);
         let tight = GraspConfig { carry_margin: TIGHT * self.config.grasp.carry_margin, ..self.config.grasp.clone() };
-        let mut first = Failure::new(FailureStage::NoPlan, "no arm is free");
-        for (config, is_first) in [(&self.config.grasp, true), (&tight, false)] {
+        let mut first = None;
+        for config in [&self.config.grasp, &tight] {
             let mut crowded = None;
-            for (rank, arms) in assignments.iter().enumerate() {
+            for arms in assignments {
                 match self.choices(arms, contacts, config, &mut stream) {
                     Ok(Choices { roomy, .. }) if !roomy.is_empty() => return Ok((arms.clone(), roomy)),
                     Ok(choices) => drop(crowded.get_or_insert((arms.clone(), choices.crowded))),
-                    Err(failure) if is_first && rank == 0 => first = failure,
-                    Err(_) => {}
+                    Err(failure) => drop(first.get_or_insert(failure)),
                 }
             }
             if let Some(found) = crowded {
                 return Ok(found);
             }
         }
-        Err(first)
+        Err(first.unwrap_or_else(|| Failure::new(FailureStage::NoPlan, "no arm is free")))
     }
 
     /// The combinations of grasps on these contacts that the arms can make if part p is taken by `arms[p]`.
@@ -370,13 +369,10 @@ impl<'a> Attempt<'a> {
         self.turned = turns.fold(self.turned, f64::max);
     }
 
-    /// Whether the goal was met while it was to be held, by hands in which no part turned further than it may.
+    /// Whether the goal was met while it was to be held, by hands that held firmly.
     pub(crate) fn goal_held(&self) -> Result<(), Failure> {
         if self.factor <= 1.0 {
-            let most = self.config.most_turn;
-            let (turned, may) = (self.turned.to_degrees(), most.to_degrees());
-            let why = || format!("a part turned by {turned:.1}° in its hand, at most {may:.1}° may be learned from");
-            return if self.turned <= most { Ok(()) } else { Err(Failure::new(FailureStage::Slip, why())) };
+            return self.held_firmly();
         }
         let [position, rotation, turn, slide] = self.errors;
         let why = format!(
@@ -387,6 +383,16 @@ impl<'a> Attempt<'a> {
             slide * 1e3
         );
         Err(Failure::new(FailureStage::Threshold, why))
+    }
+
+    /// Whether no part turned in its hand further than it may.
+    fn held_firmly(&self) -> Result<(), Failure> {
+        if self.turned <= self.config.most_turn {
+            return Ok(());
+        }
+        let [turned, most] = [self.turned, self.config.most_turn].map(f64::to_degrees);
+        let why = format!("a part turned by {turned:.1}° in its hand, at most {most:.1}° may be learned from");
+        Err(Failure::new(FailureStage::Slip, why))
     }
 
     /// Writes the record.

@@ -61,7 +61,7 @@ impl Attempt<'_> {
     }
 
     /// The step's place of the object, displaced about its middle.
-    fn other_places(&self) -> Vec<ObjectGoal> {
+    fn other_places(&self) -> [ObjectGoal; PLACES.len()] {
         let goal = self.step_goal(self.held.len());
         let parts = self.simulation.object_state().world_from_parts;
         let middle = parts.iter().map(|part| part.translation.vector).sum::<Vector3<f64>>() / parts.len() as f64;
@@ -72,6 +72,6 @@ impl Attempt<'_> {
             let by = Pose::translation(0.0, 0.0, rise) * about;
             ObjectGoal { world_from_root: by * goal.world_from_root, ..goal.clone() }
         };
-        PLACES.map(displaced).to_vec()
+        PLACES.map(displaced)
     }
 }

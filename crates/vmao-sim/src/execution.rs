@@ -6,7 +6,7 @@ use crate::simulation::{Grip, Simulation};
 use nalgebra::{Vector3, Vector6};
 use serde::{Deserialize, Serialize};
 use vmao_core::contact::{ArmId, PartId};
-use vmao_core::geometry::{Pose, interpolate, rotation_distance, rotation_log};
+use vmao_core::geometry::{Pose, interpolate, pose_distance, rotation_log};
 use vmao_core::object_centric::{ObjectTrajectory, gripper_goal};
 use vmao_core::osc::JointVector;
 use vmao_core::outcome::FailureStage;
@@ -43,9 +43,8 @@ impl MotionConfig {
     pub(crate) fn duration(&self, from: &[Pose], to: &[Pose]) -> f64 {
         let mut duration = self.shortest_motion;
         for (from, to) in from.iter().zip(to) {
-            let distance = (to.translation.vector - from.translation.vector).norm();
-            duration = duration.max(distance / self.object_speed);
-            duration = duration.max(rotation_distance(&from.rotation, &to.rotation) / self.object_turning_speed);
+            let [distance, turn] = pose_distance(from, to);
+            duration = duration.max(distance / self.object_speed).max(turn / self.object_turning_speed);
         }
         duration
     }
@@ -216,8 +215,7 @@ impl Simulation<'_> {
 
     fn watch_slip(&self, held: &[(ArmId, PartId)], before: &[Pose]) -> Result<(), Failure> {
         for ((now, before), (arm, part)) in self.part_from_tools(held).iter().zip(before).zip(held) {
-            let shift = (now.translation.vector - before.translation.vector).norm();
-            let turn = rotation_distance(&now.rotation, &before.rotation);
+            let [shift, turn] = pose_distance(now, before);
             if shift > SLIPPED[0] || turn > SLIPPED[1] {
                 let why =
                     format!("part {} slipped in arm {} by {:.0} mm and {:.0}°", part.0, arm.0, shift * 1e3, turn.to_degrees());

@@ -7,7 +7,7 @@ use crate::scene::Scene;
 use nalgebra::{Unit, UnitQuaternion, Vector3};
 use serde::{Deserialize, Serialize};
 use vmao_core::contact::PartId;
-use vmao_core::geometry::{Pose, rotation_distance};
+use vmao_core::geometry::{Pose, pose_distance};
 use vmao_core::object::{Joint, JointKind, ObjectGoal, ObjectState};
 use vmao_core::object_centric::{ball_change, joint_errors, joint_positions, part_poses};
 use vmao_core::outcome::Reachability;
@@ -207,8 +207,9 @@ fn changed(now: f64, low: f64, high: f64, change: f64, stream: &mut Stream) -> f
 pub(crate) fn goal_errors(scene: &Scene, goal_parts: &[Pose], goal: &ObjectGoal, state: &ObjectState) -> [f64; 4] {
     let mut errors = [0.0_f64; 4];
     for (wanted, is) in goal_parts.iter().zip(&state.world_from_parts) {
-        errors[0] = errors[0].max((wanted.translation.vector - is.translation.vector).norm());
-        errors[1] = errors[1].max(rotation_distance(&wanted.rotation, &is.rotation));
+        let [position, rotation] = pose_distance(wanted, is);
+        errors[0] = errors[0].max(position);
+        errors[1] = errors[1].max(rotation);
     }
     let measured = joint_positions(&scene.object, &state.world_from_parts);
     for (joint, error) in scene.object.joints.iter().zip(joint_errors(&scene.object, &goal.joint_positions, &measured)) {

@@ -5,7 +5,7 @@ use crate::scene::Scene;
 use crate::simulation::Simulation;
 use crate::task::{StartConfig, sample_start};
 use nalgebra::Vector3;
-use vmao_core::geometry::{Pose, rotation_distance, rotation_exp};
+use vmao_core::geometry::{Pose, pose_distance, rotation_exp};
 use vmao_core::osc::OscGains;
 use vmao_core::random::Stream;
 
@@ -60,8 +60,9 @@ pub fn random_rollout(scene: &Scene, gains: OscGains, start: &StartConfig, secon
         for arm in 0..arms {
             let (now, goal) = (simulation.tool_pose(arm), simulation.goals[arm].world_from_tool);
             rollout.hand_paths[arm] += (now.translation.vector - before[arm].translation.vector).norm();
-            rollout.errors[0] += (now.translation.vector - goal.translation.vector).norm();
-            rollout.errors[1] += rotation_distance(&now.rotation, &goal.rotation);
+            let [position, rotation] = pose_distance(&now, &goal);
+            rollout.errors[0] += position;
+            rollout.errors[1] += rotation;
         }
     }
     rollout.steps = simulation.steps;

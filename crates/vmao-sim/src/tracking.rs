@@ -7,7 +7,7 @@ use crate::trial::TrialConfig;
 use nalgebra::{Vector3, Vector6};
 use std::f64::consts::FRAC_PI_2;
 use vmao_core::catalogue::CatalogueItem;
-use vmao_core::geometry::{Pose, interpolate, minimum_jerk, rotation_distance, rotation_exp, rotation_log};
+use vmao_core::geometry::{Pose, interpolate, minimum_jerk, pose_distance, rotation_exp, rotation_log};
 use vmao_core::object::{ArticulatedObject, Part};
 use vmao_core::robots::RobotModel;
 use vmao_core::shape::{Shape, Solid};
@@ -141,7 +141,7 @@ fn follow_tool_path(simulation: &mut Simulation<'_>, posture: Posture, motion: &
         simulation.tick();
         let is = simulation.tool_pose(0);
         // Body poses are those at the start of the tick, where the goal before this one applied.
-        settled = [(is.translation.vector - before.translation.vector).norm(), rotation_distance(&is.rotation, &before.rotation)];
+        settled = pose_distance(&is, &before);
         for (sum, error) in squares.iter_mut().zip(settled) {
             *sum += error * error;
         }

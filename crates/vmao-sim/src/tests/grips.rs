@@ -1,16 +1,12 @@
 //! Hands that carry one object together keep their parts still in them.
 
 use super::observed;
-use super::support::{configuration, demonstrated_trial};
-use crate::layout::Layout;
-use crate::scene::{Scene, SceneConfig};
+use super::support::{configuration, demonstrated_trial, three_sawyers};
 use crate::simulation::Simulation;
 use std::cell::RefCell;
 use std::rc::Rc;
-use vmao_core::catalogue::{InstanceSet, item};
 use vmao_core::geometry::{Pose, rotation_distance};
 use vmao_core::order::GraspOrder;
-use vmao_core::robots::sawyer;
 
 /// Turns in the hand are looked at over this many ticks at the end of a trial: the motion and the rest at its goal.
 const LAST: usize = 1000;
@@ -19,9 +15,7 @@ const LAST: usize = 1000;
 fn turns(grip_memory: f64, trials: std::ops::Range<u64>) -> Vec<f64> {
     let (physics, mut config) = configuration();
     config.motion.grip_memory = grip_memory;
-    let item = item("three-sticks", InstanceSet::Train, 0).unwrap();
-    let layout = Layout::TwoParallelOneOpposite;
-    let scene = Scene::new(&SceneConfig { layout, ..physics }, vec![sawyer(2); 3], item).unwrap();
+    let scene = three_sawyers(&physics);
     let turn = |index| {
         let seen: Rc<RefCell<Vec<Vec<Pose>>>> = Rc::default();
         let noted = Rc::clone(&seen);

@@ -1,17 +1,13 @@
 //! What a trial does when the next hand finds no way to the object, or finds it elsewhere than where it was seen.
 
-use super::support::{SEED, configuration, configuration_with, failed_at, scene};
-use crate::layout::Layout;
-use crate::scene::{Scene, SceneConfig};
-use crate::trial::{Recording, Trial, TrialConfig, run_trial};
+use super::support::{SEED, configuration, configuration_with, failed_at, scene, three_sawyers};
+use crate::trial::{Recording, Trial, run_trial};
 use nalgebra::Point3;
 use std::sync::atomic::{AtomicUsize, Ordering};
-use vmao_core::catalogue::{InstanceSet, item};
 use vmao_core::contact_model::{ContactModel, ContactQuery, FingerPoints, FixedTuple};
 use vmao_core::order::GraspOrder;
 use vmao_core::outcome::FailureStage;
 use vmao_core::random::Stream;
-use vmao_core::robots::sawyer;
 
 /// As demonstrated, but for the first `misses` looks for the second grasp, which want points that no arm reaches.
 struct FarAtFirst {
@@ -68,10 +64,8 @@ fn a_contact_that_is_nowhere_in_reach_is_looked_for_at_every_place_and_fails() {
 #[test]
 fn hands_that_find_a_held_part_elsewhere_plan_again() {
     let settings = [("scene.base_distance", "0.66"), ("grasp.closing_force", "12.0")];
-    let (physics, config): (SceneConfig, TrialConfig) = configuration_with(&settings);
-    let layout = Layout::TwoParallelOneOpposite;
-    let sticks = item("three-sticks", InstanceSet::Train, 0).unwrap();
-    let scene = Scene::new(&SceneConfig { layout, ..physics }, vec![sawyer(2); 3], sticks).unwrap();
+    let (physics, config) = configuration_with(&settings);
+    let scene = three_sawyers(&physics);
     let model = FixedTuple(scene.demonstrations[0].clone());
     let run = |index| run_trial(&scene, &config, &model, GraspOrder::Sequential, (SEED, index), Recording::On);
     // The first hand holds its stick firmly in the one trial and lets it turn in the other.

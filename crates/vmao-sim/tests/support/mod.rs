@@ -10,8 +10,8 @@ use vmao_core::outcome::{FailureStage, TrialOutcome};
 use vmao_core::random::Stream;
 use vmao_core::robots::{DEFAULT_SLOT, panda, sawyer};
 use vmao_sim::{
-    CameraConfig, Friction, GoalConfig, GraspConfig, MotionConfig, Recording, Scene, SceneConfig, StartConfig, Thresholds, Trial,
-    TrialConfig, run_trial,
+    CameraConfig, Friction, GoalConfig, GraspConfig, Layout, MotionConfig, Recording, Scene, SceneConfig, StartConfig,
+    Thresholds, Trial, TrialConfig, run_trial,
 };
 
 /// Seed of all trials of these tests.
@@ -59,6 +59,12 @@ pub(crate) fn scene(instance: u16) -> Scene {
 /// A Panda and a Sawyer opposite each other, and the pliers in their first training size.
 pub(crate) fn mixed_scene() -> Scene {
     Scene::new(&configuration().0, vec![panda(), sawyer(DEFAULT_SLOT)], item("pliers", InstanceSet::Train, 0).unwrap()).unwrap()
+}
+
+/// Three Sawyers, two in parallel and one opposite, and the three sticks in their first training size.
+pub(crate) fn three_sawyers(config: &SceneConfig) -> Scene {
+    let config = SceneConfig { layout: Layout::TwoParallelOneOpposite, ..config.clone() };
+    Scene::new(&config, vec![sawyer(DEFAULT_SLOT); 3], item("three-sticks", InstanceSet::Train, 0).unwrap()).unwrap()
 }
 
 /// All sliding friction of the scene at `sliding`.
