@@ -2,6 +2,7 @@
 
 import { ConeGeometry, CylinderGeometry, Group, Mesh, MeshBasicMaterial, Vector3 } from "three";
 import { HAND_FORCE, PAD_FORCE } from "./palette.js";
+import { FORCE_FRAMES } from "./unpack.js";
 
 const METRES_PER_NEWTON = 0.004;
 const LONGEST = 0.3; // m
@@ -49,7 +50,7 @@ export class Forces {
   }
 
   vector(frame, pad, first) {
-    const at = (frame * 2 * this.rollout.arms + pad) * WIDTH + first;
+    const at = (Math.floor(frame / FORCE_FRAMES) * 2 * this.rollout.arms + pad) * WIDTH + first;
     return new Vector3(...this.rollout.forces.subarray(at, at + 3));
   }
 

@@ -11,9 +11,9 @@ import { resultsSection } from "./results.js";
 import { rolloutsSection } from "./rollouts.js";
 import { trainingSection } from "./training.js";
 
-function main() {
-  const data = pageData();
+async function main() {
   const page = document.getElementById("page");
+  const data = await pageData();
   const stage = createStage();
   const sections = [
     ["results", "Results", () => resultsSection(data.cells ?? [])],
@@ -42,4 +42,7 @@ function main() {
   stage?.start();
 }
 
-main();
+main().catch((error) => {
+  console.error(error);
+  document.getElementById("page").replaceChildren(el("p", { class: "notice" }, `This report could not be read: ${error.message}`));
+});

@@ -55,7 +55,7 @@ pub fn write_report(directory: &Path) -> Result<PathBuf, Failure> {
         },
     };
     let path = directory.join("report.html");
-    let page = render(&data);
+    let page = render(&data)?;
     write_whole(&path, |file| file.write_all(page.as_bytes())).with_context(|| path.display().to_string())?;
     Ok(path)
 }

@@ -2,6 +2,7 @@
 #![expect(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
 mod explorations;
+mod page;
 
 use explorations::{answer, check_failure, vmao};
 use serde_json::Value;
@@ -98,8 +99,7 @@ fn check_kept_and_reported(run: &Path) {
     assert_eq!(kept, expected);
     let page = fs::read_to_string(run.join("report.html")).unwrap();
     assert!(page.len() < 20_000_000);
-    let (_, rest) = page.split_once(r#"id="report-data">"#).unwrap();
-    let data: Value = serde_json::from_str(rest.split_once("</script").unwrap().0).unwrap();
+    let data = page::carried(&page);
     assert_eq!(data["rollouts_note"], "All 4 trials of the table can be played.");
     let rollouts = data["rollouts"].as_array().unwrap();
     assert_eq!(rollouts.len(), 4);

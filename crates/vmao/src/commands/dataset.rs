@@ -148,7 +148,7 @@ fn show(directory: &Path, trial: u64, session: &Session) -> Result<(), Failure> 
             .with_context(|| place.display().to_string())?;
     }
     let report = place.join("report.html");
-    let page = render(&data);
+    let page = render(&data)?;
     write_whole(&report, |file| file.write_all(page.as_bytes())).with_context(|| report.display().to_string())?;
     session.print(&Shown { report, equal: true })
 }

@@ -111,7 +111,7 @@ pub(super) fn run(arguments: &SampleArguments, session: &Session) -> Result<(), 
         ..ReportData::default()
     };
     let report = directory.join("report.html");
-    let page = render(&data);
+    let page = render(&data)?;
     write_whole(&report, |file| file.write_all(page.as_bytes())).with_context(|| report.display().to_string())?;
     session.print(&json!({ "maps": written, "report": report }))
 }

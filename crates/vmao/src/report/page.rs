@@ -1,22 +1,59 @@
 //! The page: the template with title, style, data and script put in their places.
 
 use super::data::ReportData;
+use crate::rollouts::squeeze;
+use serde_json::Value;
+use std::collections::BTreeMap;
+use std::io;
 
 const TEMPLATE: &str = include_str!("template.html");
 const STYLE: &str = include_str!("style.css");
 const SCRIPT: &str = include_str!("viewer.js");
 
+/// Texts of a rollout that are long; what moves is the same for many.
+const LONG: [&str; 3] = ["bodies", "motion", "forces"];
+
 /// One self-contained HTML page. The same data gives the same bytes; what is not finite becomes a gap.
-pub fn render(data: &ReportData) -> String {
-    // Every map key of the data is a string and no serializer here fails, so the fallback is never seen.
-    let json = serde_json::to_string(data).unwrap_or_else(|_unreachable| "{}".into());
-    fill(TEMPLATE, |name| match name {
+pub fn render(data: &ReportData) -> io::Result<String> {
+    let packed = squeeze(&serde_json::to_vec(&carried(data)?)?)?;
+    Ok(fill(TEMPLATE, |name| match name {
         "title" => Some(escape_text(&data.title)),
         "style" => Some(STYLE.into()),
-        "data" => Some(escape_json(&json)),
+        "data" => Some(packed.clone()),
         "script" => Some(SCRIPT.into()),
         _ => None,
-    })
+    }))
+}
+
+/// The data as JSON, with the long texts of rollouts in a list of their own, `texts`: once each, and the short ones side by side.
+fn carried(data: &ReportData) -> serde_json::Result<Value> {
+    let mut carried = serde_json::to_value(data)?;
+    let mut numbers = BTreeMap::new();
+    let mut texts = Vec::new();
+    take_apart(&mut carried, &mut |text| {
+        *numbers.entry(text).or_insert_with_key(|text| {
+            texts.push(Value::from(text.as_str()));
+            texts.len() - 1
+        })
+    });
+    carried["texts"] = Value::Array(texts);
+    Ok(carried)
+}
+
+/// Replaces the long texts of every rollout by their numbers.
+fn take_apart(value: &mut Value, number: &mut impl FnMut(String) -> usize) {
+    match value {
+        Value::Object(fields) if LONG.iter().all(|name| fields.get(*name).is_some_and(Value::is_string)) => {
+            for name in LONG {
+                if let Some(Value::String(text)) = fields.get_mut(name).map(Value::take) {
+                    fields.insert(name.into(), Value::from(number(text)));
+                }
+            }
+        }
+        Value::Object(fields) => fields.values_mut().for_each(|value| take_apart(value, number)),
+        Value::Array(values) => values.iter_mut().for_each(|value| take_apart(value, number)),
+        _ => (),
+    }
 }
 
 /// Replaces each `{{name}}` of the template once; what is put in is not looked at again, so data cannot name a place.
@@ -37,11 +74,6 @@ fn fill(template: &str, value: impl Fn(&str) -> Option<String>) -> String {
         }
     }
     page + rest
-}
-
-/// JSON that cannot end or open an element: `<`, `>` and `&` stand only inside JSON strings, where an escape is equal.
-fn escape_json(json: &str) -> String {
-    json.replace('<', "\\u003c").replace('>', "\\u003e").replace('&', "\\u0026")
 }
 
 fn escape_text(text: &str) -> String {
@@ -74,13 +106,5 @@ mod tests {
         let script = SCRIPT.to_lowercase();
         assert!(!script.contains("</script") && !script.contains("<!--"));
         assert!(script.contains("three.js authors") && script.contains("permission is hereby granted"));
-    }
-
-    #[test]
-    fn escaped_json_reads_as_before() {
-        let text = serde_json::to_string("</script><!-- & \u{2028}").unwrap();
-        let escaped = escape_json(&text);
-        assert!(!escaped.contains(['<', '>', '&']));
-        assert_eq!(serde_json::from_str::<String>(&escaped).unwrap(), "</script><!-- & \u{2028}");
     }
 }

@@ -12,7 +12,7 @@ const MAX_UNFOLDED: u64 = 256 << 20;
 const FURTHEST: f64 = 1e9;
 
 /// Any bytes as compressed text.
-pub(super) fn squeeze(bytes: &[u8]) -> io::Result<String> {
+pub(crate) fn squeeze(bytes: &[u8]) -> io::Result<String> {
     let mut packed = Vec::new();
     ZlibEncoder::new(bytes, Compression::best()).read_to_end(&mut packed)?;
     Ok(STANDARD.encode(packed))

@@ -1,8 +1,11 @@
 //! The motions of a run's trials: recorded while they are evaluated, kept one file a trial, shown by the report and exported.
 
+mod bodies;
 mod columns;
+mod mounts;
 mod packed;
 
+pub(crate) use columns::squeeze;
 pub use packed::PackedRollout;
 
 use crate::evaluation::TrialLine;
@@ -19,7 +22,7 @@ use vmao_core::order::GraspOrder;
 use vmao_core::rollout::Rollout;
 
 /// Version of the files' layout.
-const SCHEMA: u32 = 1;
+const SCHEMA: u32 = 2;
 
 /// `rollouts/` of a run directory: one JSON file for each trial of the table.
 #[derive(Debug)]

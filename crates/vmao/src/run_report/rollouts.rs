@@ -11,7 +11,9 @@ use vmao_core::outcome::{FailureStage, TrialOutcome};
 use vmao_sim::Recording;
 
 /// Bytes of motions that a page may carry, so that all of it stays under 20 MB.
-const BUDGET: usize = 16_000_000;
+const BUDGET: usize = 17_500_000;
+/// Bytes that a motion's stages, contacts and words take in a page, about.
+const WORDS: usize = 350;
 /// Trials that are run again for a report at most, where a run kept no motions.
 const RUN_AGAIN: usize = 16;
 
@@ -38,10 +40,13 @@ pub(super) fn motions(evaluation: &Evaluation<'_>, stored: &StoredRollouts, line
     let mut run: BTreeMap<usize, Option<PackedRollout>> = missing.par_iter().map(run).collect::<Result<_, Failure>>()?;
     bar.finish();
     let mut shown: BTreeMap<usize, PackedRollout> = BTreeMap::new();
-    let mut bytes = 0;
+    let (mut bytes, mut things) = (0, BTreeSet::new());
     for line in order {
         let Some(rollout) = kept[line].take().or_else(|| run.remove(&line)?) else { continue };
-        bytes += rollout.bodies.len() + rollout.motion.len() + rollout.forces.len() + 120 * rollout.events.len();
+        bytes += WORDS + rollout.motion.len() + rollout.forces.len();
+        if things.insert(rollout.bodies.clone()) {
+            bytes += rollout.bodies.len();
+        }
         if bytes > BUDGET {
             break;
         }
