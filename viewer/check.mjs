@@ -91,6 +91,7 @@ try {
     await page.waitForTimeout(900);
     await page.locator(".map .code").nth(1).click();
     check("a code can be chosen", await page.locator(".map").nth(1).evaluate((node) => node.classList.contains("chosen")));
+    await page.waitForTimeout(1000); // what the code leads to is loaded before it is tried below
   }
 
   const loaded = (player) => player.locator("canvas").evaluate(async (node) => {

@@ -11,6 +11,7 @@ import { unpackRollout } from "./unpack.js";
 
 const FIELD = 28;
 const ASPECT = 16 / 10; // as the style sheet has it
+const TOLD_EVERY = 0.08; // s: while playing, clock and slider need not follow every picture, and each change of the page costs one
 const SPEEDS = [0.25, 0.5, 1, 2, 4];
 const NOTHING = new Scene();
 
@@ -28,6 +29,7 @@ function outcomeBadge(outcome) {
 export class Player {
   constructor(stage, turn = null) {
     this.turn = turn;
+    this.stage = stage;
     [this.time, this.playing, this.speed, this.asked] = [0, false, 1, 0];
     this.shown = { arms: true, goal: true, contacts: true, forces: true };
     this.camera = new PerspectiveCamera(FIELD, 1, 0.01, 50);
@@ -148,6 +150,10 @@ export class Player {
   seek(to) {
     const duration = this.world?.motion.duration ?? 0;
     this.time = Math.min(duration, Math.max(0, to));
+    this.view.invalidate();
+    const now = performance.now() / 1000;
+    if (this.playing && now - (this.told ?? 0) < TOLD_EVERY) return;
+    this.told = now;
     this.slider.value = String(this.time);
     this.slider.style.setProperty("--done", `${duration ? (100 * this.time) / duration : 0}%`);
     this.slider.setAttribute("aria-valuetext", seconds(this.time));
@@ -155,7 +161,6 @@ export class Player {
     this.stageLabel.textContent = this.line?.mark(this.time) ?? "";
     this.stageLabel.hidden = !this.stageLabel.textContent;
     if (this.world) this.readout.textContent = this.forceWords();
-    this.view.invalidate();
   }
 
   forceWords() {
@@ -176,12 +181,18 @@ export class Player {
     this.playing = on && duration > 0;
     this.play.textContent = this.playing ? "Pause" : "Play";
     this.play.dataset.state = this.playing ? "playing" : "paused";
-    if (!this.playing) return;
+    if (this.world) this.world.coarse = this.playing && this.stage.coarse;
+    if (!this.playing) {
+      if (!this.world) return;
+      this.world.shadow.needsUpdate = true;
+      this.seek(this.time);
+      return;
+    }
     if (this.time >= duration) this.time = 0;
     this.view.animate((elapsed) => {
       if (!this.playing) return false;
       this.seek(this.time + elapsed * this.speed);
-      if (this.time >= duration) this.toggle(false);
+      if (this.time >= duration) this.still(duration);
       return this.playing;
     });
   }

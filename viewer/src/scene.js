@@ -7,13 +7,15 @@ import {
 import { Forces } from "./forces.js";
 import { Motion, readPose } from "./motion.js";
 import { FINGERS, GOAL } from "./palette.js";
-import { placeSolid, solidGeometry } from "./solids.js";
+import { bodyGeometry } from "./solids.js";
 
 const BALL = 0.0065; // m
 
 export class RolloutScene {
   constructor(rollout) {
     this.rollout = rollout;
+    // Of a moving scene on a machine without a graphics card, shadows follow on every fourth picture.
+    [this.coarse, this.drawn] = [false, 0];
     this.motion = new Motion(rollout);
     this.scene = new Scene();
     this.armMaterials = [];
@@ -38,13 +40,13 @@ export class RolloutScene {
     this.shadow?.map?.dispose();
   }
 
+  /** A body is one mesh, each solid in its colour: every mesh costs a call to the graphics card, and there are hundreds of solids. */
   body({ solids, kind }) {
     const group = new Group();
-    for (const { shape, pose, color } of solids) {
-      const material = new MeshStandardMaterial({ color: new Color().setRGB(...color, "srgb"), roughness: kind === "table" ? 0.95 : 0.5, metalness: 0.02 });
-      if (kind === "arm") this.armMaterials.push(material);
-      const mesh = new Mesh(solidGeometry(shape), material);
-      placeSolid(mesh, pose);
+    const material = new MeshStandardMaterial({ vertexColors: true, roughness: kind === "table" ? 0.95 : 0.5, metalness: 0.02 });
+    if (kind === "arm") this.armMaterials.push(material);
+    if (solids.length) {
+      const mesh = new Mesh(bodyGeometry(solids), material);
       mesh.castShadow = kind !== "table";
       mesh.receiveShadow = true;
       group.add(mesh);
@@ -63,13 +65,11 @@ export class RolloutScene {
     parts.forEach(({ solids }, index) => {
       const group = new Group();
       if (!readPose(goal, 7 * index, group.position, group.quaternion)) return;
-      for (const { shape, pose } of solids) {
-        for (const [material, order] of [[hidden, 1], [green, 2]]) {
-          const mesh = new Mesh(solidGeometry(shape), material);
-          placeSolid(mesh, pose);
-          mesh.renderOrder = order;
-          group.add(mesh);
-        }
+      const shape = bodyGeometry(solids);
+      for (const [material, order] of [[hidden, 1], [green, 2]]) {
+        const mesh = new Mesh(shape, material);
+        mesh.renderOrder = order;
+        group.add(mesh);
       }
       ghost.add(group);
     });
@@ -151,7 +151,7 @@ export class RolloutScene {
 
   /** Balls where fingers were asked to touch; each rides on the body it lies on. Shown from the stage before the grasp on. */
   makeContacts() {
-    const shape = new SphereGeometry(BALL, 24, 16);
+    const shape = new SphereGeometry(BALL, 14, 9);
     const out = [];
     for (const { time, part, fingers } of this.rollout.contacts) {
       this.place(time);
@@ -184,7 +184,7 @@ export class RolloutScene {
 
   /** Moves everything to `time` (s). */
   place(time) {
-    if (this.shadow && time !== this.time) this.shadow.needsUpdate = true;
+    if (this.shadow && time !== this.time && !(this.coarse && ++this.drawn % 4)) this.shadow.needsUpdate = true;
     this.time = time;
     this.bodies.forEach((group, i) => this.motion.place(i, time, group));
     this.forces?.place(this.motion.frameAt(time));

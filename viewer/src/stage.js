@@ -5,9 +5,19 @@ import { SRGBColorSpace, PCFShadowMap, WebGLRenderer } from "three";
 
 /** The page's renderer, or null where the browser has no WebGL 2. */
 export function createStage() {
+  const coarse = drawsOnProcessor();
   const canvas = document.createElement("canvas");
-  const context = canvas.getContext("webgl2", { antialias: true, alpha: true, powerPreference: "low-power" });
-  return context ? new Stage(canvas, context) : null;
+  const context = canvas.getContext("webgl2", { antialias: !coarse, alpha: true, powerPreference: "low-power" });
+  return context ? new Stage(canvas, context, coarse) : null;
+}
+
+/** Whether pictures are computed by the processor, for want of a graphics card: then smooth edges cost more than they show. */
+function drawsOnProcessor() {
+  const context = document.createElement("canvas").getContext("webgl2");
+  const named = context?.getExtension("WEBGL_debug_renderer_info");
+  const name = context?.getParameter(named?.UNMASKED_RENDERER_WEBGL ?? context.RENDERER) ?? "";
+  context?.getExtension("WEBGL_lose_context")?.loseContext();
+  return /swiftshader|llvmpipe|softpipe|software|basic render/i.test(name);
 }
 
 /** A view: a canvas, what it shows, and when it must be drawn again. */
@@ -30,8 +40,9 @@ class View {
 }
 
 class Stage {
-  constructor(canvas, context) {
-    this.renderer = new WebGLRenderer({ canvas, context, antialias: true, alpha: true });
+  constructor(canvas, context, coarse) {
+    this.coarse = coarse;
+    this.renderer = new WebGLRenderer({ canvas, context, alpha: true });
     this.renderer.outputColorSpace = SRGBColorSpace;
     this.renderer.shadowMap.enabled = true;
     this.renderer.shadowMap.type = PCFShadowMap;
