@@ -97,7 +97,7 @@ impl PackedRollout {
             forces: squeeze(&forces)?,
             goal: rollout.goal.iter().map(|pose| seven(pose).map(short)).collect(),
             events: rollout.events.clone(),
-            contacts: rollout.contacts.iter().cloned().map(shortened).collect(),
+            contacts: rollout.contacts.iter().map(shortened).collect(),
             outcome: rollout.outcome.clone(),
         })
     }
@@ -227,8 +227,8 @@ fn short(value: f64) -> f64 {
     (value * 1e5).round() / 1e5
 }
 
-fn shortened(contact: RolloutContact) -> RolloutContact {
-    RolloutContact { fingers: contact.fingers.map(|point| point.map(short)), ..contact }
+fn shortened(contact: &RolloutContact) -> RolloutContact {
+    RolloutContact { fingers: contact.fingers.map(|point| point.map(short)), ..contact.clone() }
 }
 
 /// A pad's points; without contact it stays where it was, which takes no room.
