@@ -2,6 +2,7 @@
 
 /** The page's data. */
 export async function pageData() {
+  if (!("DecompressionStream" in window)) throw new Error("it needs a browser of 2023 or later, with DecompressionStream");
   const json = new TextDecoder().decode(await unfold(document.getElementById("report-data").textContent.trim()));
   const data = JSON.parse(json);
   const executed = (data.contact_maps ?? []).flatMap(({ maps }) => maps.map((map) => map.executed));

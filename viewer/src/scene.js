@@ -45,12 +45,10 @@ export class RolloutScene {
     const group = new Group();
     const material = new MeshStandardMaterial({ vertexColors: true, roughness: kind === "table" ? 0.95 : 0.5, metalness: 0.02 });
     if (kind === "arm") this.armMaterials.push(material);
-    if (solids.length) {
-      const mesh = new Mesh(bodyGeometry(solids), material);
-      mesh.castShadow = kind !== "table";
-      mesh.receiveShadow = true;
-      group.add(mesh);
-    }
+    const mesh = new Mesh(bodyGeometry(solids), material);
+    mesh.castShadow = kind !== "table";
+    mesh.receiveShadow = true;
+    group.add(mesh);
     this.scene.add(group);
     return group;
   }

@@ -36,5 +36,5 @@ export function bodyGeometry(solids) {
     if (!geometry.index) geometry.setIndex(Array.from({ length: count }, (_, corner) => corner));
     return geometry.setAttribute("color", new Float32BufferAttribute(Array.from({ length: count }, () => [r, g, b]).flat(), 3));
   });
-  return mergeGeometries(placed);
+  return placed.length ? mergeGeometries(placed) : new BufferGeometry();
 }

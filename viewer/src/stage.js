@@ -101,7 +101,7 @@ class Stage {
     if (more) this.wake();
   }
 
-  /** A machine without a graphics card draws moving pictures coarser; a still one is always sharp. */
+  /** A machine without a graphics card draws moving pictures coarser than still ones. */
   adapt(view, elapsed) {
     if (!view.running) view.quality = 1;
     else if (elapsed > 0.045) view.quality = Math.max(0.5, view.quality - 0.1);

@@ -16,6 +16,9 @@ const PAD = 6;
 class Columns {
   constructor(bytes) { [this.bytes, this.at] = [bytes, 0]; }
 
+  /** Refuses numbers that nobody asked for: another layout than this one. */
+  end() { if (this.at !== this.bytes.length) throw new Error("a packed motion has more numbers than it should"); }
+
   next(length, step) {
     const out = new Float64Array(length);
     let [last, slope] = [0, 0];
@@ -80,6 +83,7 @@ function worldPoses(bodies, columns, frames) {
       out.set([position.x, position.y, position.z, w, x, y, z], place(frame, body));
     });
   });
+  columns.end();
   return out;
 }
 
@@ -92,6 +96,7 @@ function padForces(columns, count, pads) {
       values.forEach((value, k) => { out[(k * pads + pad) * PAD + column] = value; });
     }
   }
+  columns.end();
   return out;
 }
 

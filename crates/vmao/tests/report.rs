@@ -47,6 +47,12 @@ fn a_full_report_is_written_for_looking_at() {
         for (arm, pad, axis) in (0..2).flat_map(|arm| (0..6).map(move |k| (arm, k / 3, k % 3))) {
             let mean = made.iter().map(|frame| frame[arm][pad].force[axis]).sum::<f64>() / made.len() as f64;
             assert!(back.iter().all(|frame| (frame[arm][pad].force[axis] - mean).abs() <= 0.05 + 1e-9));
+            // Where a pad presses all the time, its point is between where it was.
+            let points: Vec<f64> = made.iter().map(|frame| frame[arm][pad].point[axis]).collect();
+            if made.iter().all(|frame| frame[arm][pad].force != [0.0; 3]) {
+                let [least, most] = [f64::min, f64::max].map(|of| points.iter().copied().reduce(of).unwrap());
+                assert!((least - 6e-4..=most + 6e-4).contains(&back[0][arm][pad].point[axis]));
+            }
         }
     }
     assert_eq!((&back.events, &back.outcome), (&made.events, &made.outcome));
@@ -105,6 +111,10 @@ fn a_packed_motion_that_no_trial_made_is_refused_in_words() {
     check(&|bad| bad.frames += 1, "motion: ");
     check(&|bad| bad.frames -= 1, "after the last column");
     check(&|bad| bad.arms = 1 << 40, "forces: ");
+    let nothing = PackedRollout::pack(&vmao_core::rollout::Rollout { frame_seconds: 0.04, ..Default::default() }).unwrap();
+    assert!(nothing.unpack().unwrap().frames.is_empty());
+    let endless = PackedRollout { frames: usize::MAX, ..nothing };
+    assert!(endless.unpack().unwrap_err().contains("frames: "));
     check(&|bad| bad.goal.truncate(1), "goal: 1 poses, expected 2");
     // Recorded without forces, as older programs did: the motion is there, the forces are not.
     let mut older = synthetic::motion::rollout(false);

@@ -1,6 +1,7 @@
-//! What moves in a packed rollout: names, solids and mounts, the same text for every motion of the same things.
+//! What moves in a packed rollout: names, solids and mounts, mostly the same text for all motions of the same things.
 
-use super::mounts::{Motion, fit};
+use super::mounts::{FURTHEST, Motion, fit};
+use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 use vmao_core::{
     geometry::{Pose, pose, position_quaternion},
@@ -83,6 +84,21 @@ impl PackedBody {
 }
 
 impl Mount {
+    /// Says what is wrong with the mount of a body that no trial had; `body` is its place in the list.
+    pub(super) fn check(&self, body: usize) -> Result<(), String> {
+        let unit = |axis: [f64; 3]| (Vector3::from(axis).norm() - 1.0).abs() < 1e-6;
+        let is_joint = match self.motion {
+            Motion::Fixed | Motion::Free => true,
+            Motion::Slides { axis } => unit(axis),
+            Motion::Turns { axis, anchor } => unit(axis) && Vector3::from(anchor).norm() <= FURTHEST,
+        };
+        if self.on.is_some_and(|on| on >= body) || !self.pose.iter().all(|x| x.is_finite()) || !is_joint {
+            let what = "expected a body before it, a finite pose, an axis of length one and a near anchor";
+            return Err(format!("body {body} is mounted on {:?} with {:?}, {what}", self.on, self.motion));
+        }
+        Ok(())
+    }
+
     /// How a body of `rollout` moves, and its joint over the first `frames` frames; no values where it is free or at rest.
     ///
     /// Links move with the one before them, parts with one before them of the same object, and what moves with nothing in the world.

@@ -86,7 +86,7 @@ impl StoredRollouts {
         let stored: StoredRollout = Document::read(&path).or_bad_input()?.parse().or_bad_input()?;
         let refuse = |what: String| Err(Failure::bad_input(format!("{}: {what}", path.display())));
         if stored.schema != SCHEMA {
-            return refuse(format!("schema {}, expected {SCHEMA}", stored.schema));
+            return refuse(format!("schema {}, expected {SCHEMA}; without this file the trial can be run again", stored.schema));
         }
         let found = (stored.order, stored.method, stored.index);
         if found != (line.order, line.method, line.index) {

@@ -29,7 +29,7 @@ const PAD: usize = 6;
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct PackedRollout {
-    /// What moves, and with what: a packed JSON list, equal for all trials with the same things.
+    /// What moves, and with what: a packed JSON list, mostly equal for all trials with the same things.
     pub bodies: String,
     /// How many bodies there are.
     pub body_count: usize,
@@ -114,8 +114,11 @@ impl PackedRollout {
             return Err(format!("bodies: {}, expected body_count, {}", packed.len(), self.body_count));
         }
         // What rests has no columns whose length would show that this one lies.
-        if self.frames.checked_mul(packed.len()).is_none_or(|poses| poses > MAX_POSES) {
+        if self.frames.checked_mul(packed.len().max(1)).is_none_or(|poses| poses > MAX_POSES) {
             return Err(format!("frames: {} of {} bodies, expected at most {MAX_POSES} poses", self.frames, packed.len()));
+        }
+        if self.arms > packed.len() {
+            return Err(format!("forces: {} arms of {} bodies", self.arms, packed.len()));
         }
         let frames = self.unpacked_frames(&packed)?;
         let bodies = packed.into_iter().map(PackedBody::body).collect::<Result<Vec<_>, _>>().map_err(named("bodies"))?;
@@ -142,12 +145,7 @@ impl PackedRollout {
         let mut columns = Columns::new(&bytes);
         let mut poses: Vec<Vec<Pose>> = Vec::with_capacity(bodies.len());
         for (body, PackedBody { mount, .. }) in bodies.iter().enumerate() {
-            if mount.on.is_some_and(|on| on >= body) || !mount.pose.iter().all(|x| x.is_finite()) {
-                return Err(format!(
-                    "bodies: body {body} is mounted on {:?}, expected a body before it and a finite pose",
-                    mount.on
-                ));
-            }
+            mount.check(body).map_err(|problem| format!("bodies: {problem}"))?;
             let zero = from_seven(&mount.pose);
             let mut joint = |step| columns.column(self.frames, step).map_err(named);
             let seen: Vec<Pose> = match mount.motion {

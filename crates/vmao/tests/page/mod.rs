@@ -15,6 +15,9 @@ pub(crate) fn carried(page: &str) -> Value {
     ZlibDecoder::new(&packed[..]).read_to_string(&mut json).expect("the data is packed text");
     let mut data: Value = serde_json::from_str(&json).expect("the data is JSON");
     let texts = data["texts"].take();
+    let mut known: Vec<&Value> = texts.as_array().expect("a list of texts").iter().collect();
+    known.sort_by_key(|text| text.as_str());
+    assert!(known.windows(2).all(|pair| pair[0] != pair[1]), "each text is there once");
     put_back(&mut data, &texts);
     data
 }
@@ -22,9 +25,11 @@ pub(crate) fn carried(page: &str) -> Value {
 fn put_back(value: &mut Value, texts: &Value) {
     match value {
         Value::Object(fields) => {
-            for name in ["bodies", "motion", "forces"] {
-                let text = fields.get(name).and_then(Value::as_u64).map(|number| texts[number as usize].clone());
-                text.and_then(|text| fields.insert(name.into(), text));
+            if fields.contains_key("body_count") {
+                for name in ["bodies", "motion", "forces"] {
+                    let number = fields[name].as_u64().expect("the number of a text");
+                    fields.insert(name.into(), texts[number as usize].clone());
+                }
             }
             fields.values_mut().for_each(|value| put_back(value, texts));
         }
