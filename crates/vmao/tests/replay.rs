@@ -2,6 +2,7 @@
 #![expect(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
 mod explorations;
+mod page;
 
 use explorations::{answer, check_failure, explore, vmao};
 use serde_json::Value;
@@ -72,13 +73,13 @@ fn an_exploration_runs_again_bit_for_bit_and_tampering_is_named() {
 #[test]
 fn a_trial_is_shown_and_a_data_set_described() {
     let directory = tempfile::tempdir().unwrap();
-    let (out, page) = (directory.path().join("data"), directory.path().join("shown"));
+    let (out, place) = (directory.path().join("data"), directory.path().join("shown"));
     let explored = answer(&explore(&out, 8, 4, &["--set", "explore.orders=[\"sequential\",\"parallel\"]"]).output().unwrap());
     let data = out.to_str().unwrap();
-    let shown = answer(&vmao(&["dataset", "show", data, "3", "--json", "--out", page.to_str().unwrap()]).output().unwrap());
+    let shown = answer(&vmao(&["dataset", "show", data, "3", "--json", "--out", place.to_str().unwrap()]).output().unwrap());
     assert_eq!(shown["equal"], true);
-    let html = fs::read_to_string(page.join("report.html")).unwrap();
-    assert!(html.contains("Trial 3 of ") && html.contains("equal bit for bit"));
+    let text = page::carried(&fs::read_to_string(place.join("report.html")).unwrap()).to_string();
+    assert!(text.contains("Trial 3 of ") && text.contains("equal bit for bit"));
     check_failure(&vmao(&["dataset", "show", data, "8"]).output().unwrap(), 2, &["no trial 8; trials are 0 to 7"]);
     check_failure(&verify(directory.path(), &[]), 2, &["config.toml"]);
 
